@@ -1,0 +1,25 @@
+"""The exceptions a user may see. Each message is one sentence naming the thing and the fact."""
+
+
+class LuxError(Exception):
+    """A failure that one sentence explains; the command line prints it and exits with `exit_code`."""
+
+    exit_code = 1
+
+
+class InputError(LuxError):
+    """What the user gave (a file, a flag, a parameter) cannot be used."""
+
+    exit_code = 2
+
+
+class FormatError(InputError):
+    """A file is not what its name or header says: truncated, damaged, hostile or of a newer version."""
+
+
+class DeviceError(LuxError):
+    """No usable OpenCL platform, a kernel that does not build, or a device that was lost."""
+
+
+class DivergedError(LuxError):
+    """An optimization or a model produced numbers that are not finite."""
