@@ -1,0 +1,16 @@
+"""Photos of a room become cameras, points and undistorted views in one layout."""
+
+from luxcore.capture.points import Points, read_points, write_points
+from luxcore.capture.store import Capture, Frame, Skipped, View, load_capture, write_capture
+
+__all__ = [
+    "Capture",
+    "Frame",
+    "Points",
+    "Skipped",
+    "View",
+    "load_capture",
+    "read_points",
+    "write_capture",
+    "write_points",
+]
