@@ -1,0 +1,1 @@
+"""Models that take the light of photos apart: one interface, several backends."""
