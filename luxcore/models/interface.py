@@ -1,9 +1,9 @@
 """What a model must do: decompose one photo, or carry decompositions to other views.
 
 Light in a decomposition is linear and adds up (paper, eq. 1):
-`image_linear = ambient + Σ_i scale_i · olat_i`. A lamp that is off in the photo has scale 0, and its
-`olat` is what the lamp would add when switched on. A lamp that the photo does not show (an empty
-mask) and that nothing else tells of belongs to `ambient`: its `olat` is zero.
+`image_linear = ambient + Σ_i scale_i · olat_i`. A lamp that is off in the photo has scale 0, and
+its `olat` is what the lamp would add when switched on. A lamp that the photo does not show (an
+empty mask) and that nothing else tells of belongs to `ambient`: its `olat` is zero.
 """
 
 from __future__ import annotations
