@@ -2,7 +2,7 @@
 
 
 class LuxError(Exception):
-    """A failure that one sentence explains; the command line prints it and exits with `exit_code`."""
+    """A failure that one sentence explains; `lux` prints it and exits with `exit_code`."""
 
     exit_code = 1
 
@@ -14,7 +14,7 @@ class InputError(LuxError):
 
 
 class FormatError(InputError):
-    """A file is not what its name or header says: truncated, damaged, hostile or of a newer version."""
+    """A file is not what its name or header says: truncated, damaged, hostile or too new."""
 
 
 class DeviceError(LuxError):

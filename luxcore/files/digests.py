@@ -1,4 +1,4 @@
-"""sha256 of files, of pixels and of values. Pixels are hashed where file bytes carry time stamps."""
+"""sha256 of files, pixels and values. Pixels are hashed where file bytes carry time stamps."""
 
 from __future__ import annotations
 
@@ -42,8 +42,6 @@ def tree_digest(paths: Iterable[Path], root: Path) -> str:
 def _files(paths: Iterable[Path]) -> Iterable[Path]:
     for path in paths:
         if path.is_dir():
-            yield from (
-                f for f in path.rglob("*") if f.is_file() and "__pycache__" not in f.parts
-            )
+            yield from (f for f in path.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
         else:
             yield path

@@ -1,0 +1,1 @@
+"""The workflow: the DAG as data, the Prefect flow over it, plans and schedules."""

@@ -1,0 +1,162 @@
+"""The DAG as data: one frozen record per stage. `dvc.yaml` and the Prefect flow come from here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from graphlib import TopologicalSorter
+
+COMMON_CODE = ("luxcore/files", "luxcore/units", "luxcore/cameras.py", "tasks/context.py")
+"""Code that every stage runs; a change of it makes every stage stale."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the pipeline, run as `python -m tasks NAME`."""
+
+    name: str
+    does: str
+    """One line for people."""
+    needs: tuple[str, ...] = ()
+    """Stages whose artifact folders are read."""
+    code: tuple[str, ...] = ()
+    """Files and folders whose change makes the stage stale, beside its task module."""
+    settings: tuple[str, ...] = ()
+    """Sections of `params.yaml` beside the stage's own and the seed."""
+    out: str = ""
+    """The folder it writes; `artifacts/NAME` unless said otherwise."""
+    retries: int = 1
+    """How often Prefect tries again after a failure: units already done are kept."""
+    timeout_s: int = 6 * 3600
+
+    @property
+    def folder(self) -> str:
+        """The artifact folder relative to the project root."""
+        return self.out or f"artifacts/{self.name}"
+
+    @property
+    def metrics_file(self) -> str:
+        """Flat metrics of the stage, declared to DVC; timings are never in it."""
+        return f"artifacts/metrics/{self.name}.json"
+
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        "rooms",
+        "procedural rooms with lamps, from seeds alone",
+        code=("luxcore/rooms",),
+    ),
+    Stage(
+        "render",
+        "every lamp of every room by one light-group render a view",
+        needs=("rooms",),
+        code=("luxcore/render", "luxcore/rooms"),
+    ),
+    Stage(
+        "train_sv",
+        "fine-tune the single-view decomposition model",
+        needs=("render",),
+        code=("luxcore/models", "luxcore/data", "luxcore/light"),
+    ),
+    Stage(
+        "train_mv",
+        "fine-tune the multi-view harmonization model",
+        needs=("render",),
+        code=("luxcore/models", "luxcore/data", "luxcore/light"),
+    ),
+    Stage(
+        "capture",
+        "photos with poses: a rendered room with known truth, and photos through SfM",
+        needs=("render",),
+        code=("luxcore/capture", "luxcore/light"),
+    ),
+    Stage(
+        "splat",
+        "stage 1: geometry as Gaussians, in the light the photos were taken in",
+        needs=("capture",),
+        code=("luxcore/splats", "kernels"),
+    ),
+    Stage(
+        "masks",
+        "which pixels are which lamp",
+        needs=("capture",),
+        code=("luxcore/masks", "luxcore/light"),
+    ),
+    Stage(
+        "decompose",
+        "reference views into ambient and one image per lamp",
+        needs=("capture", "masks", "splat", "train_sv"),
+        code=("luxcore/decompose", "luxcore/models", "luxcore/light"),
+    ),
+    Stage(
+        "harmonize",
+        "the decomposition carried to every view, in chained passes of at most 15",
+        needs=("capture", "masks", "splat", "decompose", "train_mv"),
+        code=("luxcore/harmonize", "luxcore/models", "luxcore/light"),
+    ),
+    Stage(
+        "fuse",
+        "three exposures per lamp and view merged to linear HDR",
+        needs=("capture", "harmonize"),
+        code=("luxcore/light",),
+    ),
+    Stage(
+        "relight",
+        "stage 2: HDR coefficients per lamp on every Gaussian",
+        needs=("capture", "masks", "splat", "fuse"),
+        code=("luxcore/splats", "kernels", "luxcore/light"),
+    ),
+    Stage(
+        "evaluate",
+        "the tables: decomposition, harmonization and relighting against truth",
+        needs=(
+            "render",
+            "capture",
+            "masks",
+            "train_sv",
+            "train_mv",
+            "splat",
+            "decompose",
+            "harmonize",
+            "fuse",
+            "relight",
+        ),
+        code=("luxcore/evaluate", "luxcore/metrics", "luxcore/models", "luxcore/splats", "kernels"),
+    ),
+    Stage(
+        "report",
+        "pictures, tables and curves on one page",
+        needs=(
+            "rooms",
+            "render",
+            "train_sv",
+            "train_mv",
+            "capture",
+            "masks",
+            "splat",
+            "decompose",
+            "harmonize",
+            "fuse",
+            "relight",
+            "evaluate",
+        ),
+        code=("luxcore/report", "luxcore/explorer", "luxcore/light"),
+        out="reports",
+    ),
+)
+
+BY_NAME = {stage.name: stage for stage in STAGES}
+
+
+def ordered() -> tuple[Stage, ...]:
+    """Stages in an order that respects `needs`; ties in the order written above."""
+    graph = {stage.name: stage.needs for stage in STAGES}
+    return tuple(BY_NAME[name] for name in TopologicalSorter(graph).static_order())
+
+
+def downstream(name: str) -> set[str]:
+    """Names of all stages that depend on `name`, directly or not."""
+    found: set[str] = set()
+    for stage in ordered():
+        if name in stage.needs or found & set(stage.needs):
+            found.add(stage.name)
+    return found

@@ -1,0 +1,37 @@
+"""`dvc.yaml`, generated from the DAG: `python -m flows.dvc_file` writes it, a test holds it equal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from flows.dag import BY_NAME, COMMON_CODE, STAGES, Stage
+
+HEADER = "# Generated from flows/dag.py by `python -m flows.dvc_file`; edit that file instead.\n"
+DVC_FILE = Path(__file__).resolve().parents[1] / "dvc.yaml"
+
+
+def render_dvc_yaml() -> str:
+    """The text of `dvc.yaml`."""
+    document = {"stages": {stage.name: _stage_entry(stage) for stage in STAGES}}
+    return HEADER + yaml.safe_dump(document, sort_keys=False, width=100)
+
+
+def _stage_entry(stage: Stage) -> dict[str, Any]:
+    code = (f"tasks/{stage.name}.py", f"luxcore/settings/{stage.name}.py")
+    inputs = [BY_NAME[name].folder for name in stage.needs]
+    return {
+        "desc": stage.does,
+        "cmd": f"python -m tasks {stage.name}",
+        "deps": sorted({*code, *stage.code, *COMMON_CODE, *inputs}),
+        "params": sorted({"seed", stage.name, *stage.settings}),
+        "outs": [stage.folder],
+        "metrics": [stage.metrics_file],
+    }
+
+
+if __name__ == "__main__":
+    DVC_FILE.write_text(render_dvc_yaml(), encoding="utf-8")
+    print(f"wrote {DVC_FILE.name} with {len(STAGES)} stages")

@@ -1,0 +1,1 @@
+"""What `params.yaml` may say: one frozen, validated section per stage."""

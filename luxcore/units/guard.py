@@ -1,0 +1,70 @@
+"""Time-out and memory cap for one unit, which then runs in a process of its own."""
+
+from __future__ import annotations
+
+import importlib
+import multiprocessing
+import resource
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from luxcore.errors import LuxError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds for one unit; None means no bound."""
+
+    timeout_s: float | None = None
+    memory_mb: int | None = None
+    """Address space of the unit's process, in MB."""
+
+
+def run_guarded(
+    function: str, out_dir: Path, arguments: dict[str, Any], limits: Limits | None
+) -> None:
+    """Call "module:callable"(out_dir, **arguments), under `limits` where there are any."""
+    if limits is None:
+        _call(function, out_dir, arguments)
+        return
+    context = multiprocessing.get_context("spawn")
+    receive, send = context.Pipe(duplex=False)
+    child = context.Process(target=_child, args=(send, function, out_dir, arguments, limits))
+    child.start()
+    send.close()
+    try:
+        if not receive.poll(limits.timeout_s):
+            raise LuxError(f"took longer than {limits.timeout_s:g} s and was stopped.")
+        problem = receive.recv()
+    except EOFError as error:
+        child.join()
+        raise LuxError(f"its process ended with code {child.exitcode}.") from error
+    finally:
+        child.kill()
+        child.join()
+    if problem is not None:
+        raise LuxError(problem)
+
+
+def _child(
+    send: Connection, function: str, out_dir: Path, arguments: dict[str, Any], limits: Limits
+) -> None:
+    if limits.memory_mb is not None:
+        resource.setrlimit(resource.RLIMIT_AS, (limits.memory_mb << 20,) * 2)
+    problem = None
+    try:
+        _call(function, out_dir, arguments)
+    except MemoryError:
+        problem = f"needed more than {limits.memory_mb} MB."
+    except LuxError as error:
+        problem = str(error)
+    except Exception as error:
+        problem = f"{type(error).__name__}: {error}"
+    send.send(problem)
+
+
+def _call(function: str, out_dir: Path, arguments: dict[str, Any]) -> None:
+    module, name = function.split(":")
+    getattr(importlib.import_module(module), name)(out_dir, **arguments)

@@ -1,0 +1,65 @@
+"""`python -m tasks STAGE`: how DVC runs a stage."""
+
+from __future__ import annotations
+
+import importlib
+import resource
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from flows.dag import BY_NAME
+from luxcore.errors import InputError, LuxError
+from luxcore.files.atomic import write_json
+from luxcore.settings.load import load_settings
+from tasks.context import StageContext
+from tasks.process import die_with_parent, stage_lock
+
+
+def main(arguments: list[str]) -> int:
+    """Run one stage; one sentence on standard error and a code other than 0 where it fails."""
+    try:
+        die_with_parent()
+        run_stage(_stage_name(arguments), Path.cwd())
+    except LuxError as error:
+        print(f"lux: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+def run_stage(name: str, root: Path) -> StageContext:
+    """Empty the stage's folder, run it, and record metrics, timings and an mlflow run."""
+    context = StageContext(BY_NAME[name], load_settings(root / "params.yaml"), root)
+    with stage_lock(root, name):
+        shutil.rmtree(context.out, ignore_errors=True)
+        context.out.mkdir(parents=True)
+        start = time.monotonic()
+        importlib.import_module(f"tasks.{name}").run(context)
+        seconds = time.monotonic() - start
+        _record(context, seconds)
+    return context
+
+
+def _record(context: StageContext, seconds: float) -> None:
+    from tasks.tracking import log_stage
+
+    peak_mb = max(
+        resource.getrusage(who).ru_maxrss / 1024
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    write_json(context.root / context.stage.metrics_file, context.metrics)
+    timings = {**context.timings, "wall_s": seconds, "peak_memory_mb": peak_mb}
+    write_json(context.root / "artifacts" / "timings" / f"{context.stage.name}.json", timings)
+    log_stage(context, seconds, peak_mb)
+    print(f"{context.stage.name}: {seconds:.1f} s, {peak_mb:.0f} MB", file=sys.stderr)
+
+
+def _stage_name(arguments: list[str]) -> str:
+    if len(arguments) != 1 or arguments[0] not in BY_NAME:
+        raise InputError(f"usage: python -m tasks STAGE, one of {', '.join(BY_NAME)}.")
+    return arguments[0]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
