@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 
+from tasks.context import artifact_folder, metrics_file
+
 COMMON_CODE = ("luxcore/files", "luxcore/units", "luxcore/cameras.py", "tasks/context.py")
 """Code that every stage runs; a change of it makes every stage stale."""
 
@@ -22,8 +24,6 @@ class Stage:
     """Files and folders whose change makes the stage stale, beside its task module."""
     settings: tuple[str, ...] = ()
     """Sections of `params.yaml` beside the stage's own and the seed."""
-    out: str = ""
-    """The folder it writes; `artifacts/NAME` unless said otherwise."""
     retries: int = 1
     """How often Prefect tries again after a failure: units already done are kept."""
     timeout_s: int = 6 * 3600
@@ -31,12 +31,12 @@ class Stage:
     @property
     def folder(self) -> str:
         """The artifact folder relative to the project root."""
-        return self.out or f"artifacts/{self.name}"
+        return artifact_folder(self.name)
 
     @property
     def metrics_file(self) -> str:
-        """Flat metrics of the stage, declared to DVC; timings are never in it."""
-        return f"artifacts/metrics/{self.name}.json"
+        """Flat metrics of the stage, declared to DVC."""
+        return metrics_file(self.name)
 
 
 STAGES: tuple[Stage, ...] = (
@@ -140,7 +140,6 @@ STAGES: tuple[Stage, ...] = (
             "evaluate",
         ),
         code=("luxcore/report", "luxcore/explorer", "luxcore/light"),
-        out="reports",
     ),
 )
 

@@ -1,4 +1,4 @@
-"""`dvc.yaml`, generated from the DAG: `python -m flows.dvc_file` writes it, a test holds it equal."""
+"""`dvc.yaml`, generated from the DAG by `python -m flows.dvc_file`; a test holds it equal."""
 
 from __future__ import annotations
 

@@ -9,11 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-from flows.dag import BY_NAME
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
 from luxcore.settings.load import load_settings
-from tasks.context import StageContext
+from tasks.context import STAGE_NAMES, StageContext, metrics_file
 from tasks.process import die_with_parent, stage_lock
 
 
@@ -30,7 +29,7 @@ def main(arguments: list[str]) -> int:
 
 def run_stage(name: str, root: Path) -> StageContext:
     """Empty the stage's folder, run it, and record metrics, timings and an mlflow run."""
-    context = StageContext(BY_NAME[name], load_settings(root / "params.yaml"), root)
+    context = StageContext(name, load_settings(root / "params.yaml"), root)
     with stage_lock(root, name):
         shutil.rmtree(context.out, ignore_errors=True)
         context.out.mkdir(parents=True)
@@ -48,16 +47,16 @@ def _record(context: StageContext, seconds: float) -> None:
         resource.getrusage(who).ru_maxrss / 1024
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
-    write_json(context.root / context.stage.metrics_file, context.metrics)
+    write_json(context.root / metrics_file(context.name), context.metrics)
     timings = {**context.timings, "wall_s": seconds, "peak_memory_mb": peak_mb}
-    write_json(context.root / "artifacts" / "timings" / f"{context.stage.name}.json", timings)
+    write_json(context.root / "artifacts" / "timings" / f"{context.name}.json", timings)
     log_stage(context, seconds, peak_mb)
-    print(f"{context.stage.name}: {seconds:.1f} s, {peak_mb:.0f} MB", file=sys.stderr)
+    print(f"{context.name}: {seconds:.1f} s, {peak_mb:.0f} MB", file=sys.stderr)
 
 
 def _stage_name(arguments: list[str]) -> str:
-    if len(arguments) != 1 or arguments[0] not in BY_NAME:
-        raise InputError(f"usage: python -m tasks STAGE, one of {', '.join(BY_NAME)}.")
+    if len(arguments) != 1 or arguments[0] not in STAGE_NAMES:
+        raise InputError(f"usage: python -m tasks STAGE, one of {', '.join(STAGE_NAMES)}.")
     return arguments[0]
 
 

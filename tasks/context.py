@@ -10,17 +10,29 @@ from typing import Any
 
 import numpy as np
 
-from flows.dag import BY_NAME, Stage
 from luxcore.errors import InputError
 from luxcore.settings.project import ProjectSettings
 from luxcore.units import Executor, UnitStore, executor_from_environment
+
+STAGE_NAMES = tuple(name for name in ProjectSettings.model_fields if name != "seed")
+"""A stage is a section of the settings, a module of this package and an artifact folder."""
+
+
+def artifact_folder(name: str) -> str:
+    """Where a stage writes, relative to the project root."""
+    return "reports" if name == "report" else f"artifacts/{name}"
+
+
+def metrics_file(name: str) -> str:
+    """Flat metrics of a stage, declared to DVC; timings are never in it."""
+    return f"artifacts/metrics/{name}.json"
 
 
 @dataclass
 class StageContext:
     """One execution of one stage."""
 
-    stage: Stage
+    name: str
     params: ProjectSettings
     root: Path
     """The project root; every artifact folder is below it."""
@@ -34,7 +46,7 @@ class StageContext:
     @property
     def settings(self) -> Any:
         """The stage's own section of `params.yaml`."""
-        return getattr(self.params, self.stage.name)
+        return getattr(self.params, self.name)
 
     @property
     def seed(self) -> int:
@@ -43,13 +55,11 @@ class StageContext:
     @property
     def out(self) -> Path:
         """The stage's artifact folder, empty when the stage starts."""
-        return self.root / self.stage.folder
+        return self.root / artifact_folder(self.name)
 
     def input(self, name: str) -> Path:
-        """The artifact folder of a stage that this one needs."""
-        if name not in self.stage.needs:
-            raise ValueError(f"stage {self.stage.name} does not declare that it needs {name}.")
-        folder = self.root / BY_NAME[name].folder
+        """The artifact folder of a stage that this one needs (declared in `flows/dag.py`)."""
+        folder = self.root / artifact_folder(name)
         if not folder.is_dir():
             raise InputError(f"{folder} does not exist: run stage {name} first.")
         return folder

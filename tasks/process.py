@@ -24,7 +24,7 @@ def die_with_parent() -> None:
 
 @contextmanager
 def stage_lock(root: Path, name: str) -> Iterator[None]:
-    """Hold the stage's lock; a second writer is told who has it. Freed by the kernel on any death."""
+    """Hold the stage's lock; a second writer is told who has it. Any death frees it."""
     path = root / ".lux" / "locks" / name
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "a+", encoding="utf-8") as stream:

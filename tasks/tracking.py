@@ -17,7 +17,7 @@ MAX_PARAM_LENGTH = 500
 
 
 def log_stage(context: StageContext, seconds: float, peak_mb: float) -> None:
-    """Write the stage's run. The store is `mlflow.db` in the project unless the environment says."""
+    """Write the stage's run to the tracking store."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     from mlflow import MlflowClient
     from mlflow.entities import Metric, Param, RunTag
@@ -26,7 +26,7 @@ def log_stage(context: StageContext, seconds: float, peak_mb: float) -> None:
     experiment = client.get_experiment_by_name(EXPERIMENT)
     experiment_id = experiment.experiment_id if experiment else client.create_experiment(EXPERIMENT)
     tags = _tags(context)
-    run = client.create_run(experiment_id, run_name=context.stage.name, tags=tags)
+    run = client.create_run(experiment_id, run_name=context.name, tags=tags)
     now = int(time.time() * 1000)
     values = {**context.metrics, "wall_s": seconds, "peak_memory_mb": peak_mb}
     metrics = [Metric(name, value, now, 0) for name, value in values.items()]
@@ -54,9 +54,8 @@ def git_revision(root: Path) -> str:
 
 def _tags(context: StageContext) -> dict[str, str]:
     tags = {
-        "stage": context.stage.name,
+        "stage": context.name,
         "git_revision": git_revision(context.root),
-        "mlflow.note.content": context.stage.does,
     }
     parent = os.environ.get("LUX_MLFLOW_PARENT")
     if parent:
@@ -74,7 +73,7 @@ def _flat_params(context: StageContext) -> dict[str, Any]:
         else:
             flat[prefix] = value
 
-    walk(context.stage.name, context.settings.model_dump(mode="json"))
+    walk(context.name, context.settings.model_dump(mode="json"))
     return flat
 
 
