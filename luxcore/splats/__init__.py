@@ -1,0 +1,1 @@
+"""Gaussian splats: files, the OpenCL engine and fitting."""
