@@ -12,6 +12,7 @@ from pathlib import Path
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
 from luxcore.settings.load import load_settings
+from luxcore.units.store import seal_folder
 from tasks.context import STAGE_NAMES, StageContext, metrics_file
 from tasks.process import die_with_parent, stage_lock
 
@@ -36,6 +37,7 @@ def run_stage(name: str, root: Path) -> StageContext:
         start = time.monotonic()
         importlib.import_module(f"tasks.{name}").run(context)
         seconds = time.monotonic() - start
+        seal_folder(context.out)
         _record(context, seconds)
     return context
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from luxcore.errors import InputError
+from luxcore.errors import InputError, LuxError
 from luxcore.settings.project import ProjectSettings
 from luxcore.units import Executor, UnitStore, executor_from_environment
+from luxcore.units.store import damaged_files
 
 STAGE_NAMES = tuple(name for name in ProjectSettings.model_fields if name != "seed")
 """A stage is a section of the settings, a module of this package and an artifact folder."""
@@ -42,6 +43,7 @@ class StageContext:
     pictures: dict[str, Path | np.ndarray] = field(default_factory=dict)
     timings: dict[str, Any] = field(default_factory=dict)
     """Seconds of anything. They never enter an artifact, so equal runs have equal bytes."""
+    _checked: set[str] = field(default_factory=set)
 
     @property
     def settings(self) -> Any:
@@ -58,10 +60,15 @@ class StageContext:
         return self.root / artifact_folder(self.name)
 
     def input(self, name: str) -> Path:
-        """The artifact folder of a stage that this one needs (declared in `flows/dag.py`)."""
+        """The artifact folder of a stage that this one needs, checked against its manifest."""
         folder = self.root / artifact_folder(name)
         if not folder.is_dir():
             raise InputError(f"{folder} does not exist: run stage {name} first.")
+        damaged = [] if name in self._checked else damaged_files(folder)
+        self._checked.add(name)
+        if damaged:
+            # A flipped bit in DVC's cache goes unseen by DVC itself; readers must look.
+            raise LuxError(f"{folder / damaged[0]} is not what stage {name} wrote; run it again.")
         return folder
 
     @property

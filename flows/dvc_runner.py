@@ -1,0 +1,126 @@
+"""Ask DVC whether a stage is stale, and let DVC run it. DVC is the only cache."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from luxcore.errors import LuxError
+from tasks.process import die_with_parent
+
+BUSY_RETRY_S = 2.0
+BUSY = "is busy"
+"""DVC's word for a stage that is running elsewhere; `--wait-for-lock` does not cover it."""
+
+
+def environment() -> dict[str, str]:
+    """The environment of a `dvc` process: this interpreter first on PATH, for `cmd: python …`."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    return {**os.environ, "PATH": path, "PYTHONUNBUFFERED": "1"}
+
+
+def stale_reasons(root: Path, stage: str) -> list[str]:
+    """Why DVC would run `stage`, one phrase each; empty where it is up to date."""
+    done = _dvc(root, "status", "--json", stage)
+    if done.returncode != 0:
+        raise LuxError(f"dvc status {stage} failed: {_last_line(done.stderr)}")
+    entries = json.loads(done.stdout or "{}").get(stage, [])
+    return reason_phrases(entries)
+
+
+def reason_phrases(entries: list[Any]) -> list[str]:
+    """DVC's status of one stage (nested names and states) as phrases for people."""
+    return [phrase for entry in entries for phrase in _entry_phrases(entry)]
+
+
+def reproduce(root: Path, stage: str) -> None:
+    """Run one stage under DVC, its output passed through. Raises LuxError where it fails."""
+    keep_lock_copy(root)
+    command = [*_DVC, "--wait-for-lock", "repro", "--single-item", stage]
+    while True:
+        process = subprocess.Popen(
+            command,
+            cwd=root,
+            env=environment(),
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=die_with_parent,
+        )
+        tail = _forward(process)
+        if process.returncode == 0:
+            return
+        if BUSY not in tail:
+            raise LuxError(f"stage {stage} failed: {_stage_error(tail)}")
+        print(f"stage {stage} is being run by another process; waiting.", file=sys.stderr)
+        time.sleep(BUSY_RETRY_S)
+
+
+def keep_lock_copy(root: Path) -> None:
+    """DVC rewrites `dvc.lock` in place; the copy in `.lux` repairs it after a power cut."""
+    lock = root / "dvc.lock"
+    if lock.is_file() and lock.stat().st_size > 0:
+        backup = root / ".lux" / "dvc.lock.before"
+        backup.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(lock, backup)
+
+
+_DVC = [sys.executable, "-m", "dvc"]
+
+
+def _dvc(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*_DVC, "--wait-for-lock", *arguments],
+        cwd=root,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def _forward(process: subprocess.Popen[str]) -> str:
+    """Copy the child's standard error here line by line; returns its last lines."""
+    lines: list[str] = []
+    assert process.stderr is not None
+    try:
+        for line in process.stderr:
+            sys.stderr.write(line)
+            lines = [*lines[-40:], line]
+        process.wait()
+    except BaseException:
+        process.send_signal(signal.SIGTERM)
+        raise
+    return "".join(lines)
+
+
+def _stage_error(tail: str) -> str:
+    own = [line[5:] for line in tail.splitlines() if line.startswith("lux: ")]
+    return own[-1] if own else _last_line(tail)
+
+
+def _last_line(text: str) -> str:
+    lines = [line for line in text.splitlines() if line.strip()]
+    return lines[-1] if lines else "no message."
+
+
+def _entry_phrases(entry: Any) -> list[str]:
+    if isinstance(entry, str):
+        return [entry]
+    phrases = []
+    for kind, changes in entry.items():
+        if isinstance(changes, dict):
+            phrases += [f"{name} {_changed(kind, state)}" for name, state in changes.items()]
+    return phrases
+
+
+def _changed(kind: str, state: Any) -> str:
+    if isinstance(state, dict):
+        return "parameters changed: " + ", ".join(sorted(state))
+    return f"{'output ' if kind == 'changed outs' else ''}{state}"

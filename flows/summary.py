@@ -1,0 +1,46 @@
+"""Tables for the terminal."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+from pathlib import Path
+
+from flows.plan import StagePlan
+
+
+def plan_table(plans: list[StagePlan]) -> str:
+    """The plan as a table."""
+    rows = [
+        [
+            p.name,
+            p.state,
+            "" if p.units is None else f"{p.units_missing} of {p.units}",
+            "?" if p.seconds is None else f"{p.seconds:.0f} s",
+            "" if p.megabytes is None else f"{p.megabytes:.1f} MB",
+            p.why if len(p.why) < 90 else p.why[:87] + "…",
+        ]
+        for p in plans
+    ]
+    return _table(["stage", "state", "units missing", "time", "disk", "why"], rows)
+
+
+def metrics_table(root: Path) -> str:
+    """The evaluation's metrics, one row each."""
+    path = root / "artifacts" / "metrics" / "evaluate.json"
+    if not path.is_file():
+        return "no evaluation yet."
+    metrics = json.loads(path.read_text())
+    return _table(["metric", "value"], [[name, f"{value:.4g}"] for name, value in metrics.items()])
+
+
+def _table(columns: list[str], rows: list[list[str]]) -> str:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*columns)
+    for row in rows:
+        table.add_row(*row)
+    stream = StringIO()
+    Console(file=stream, width=140).print(table)
+    return stream.getvalue().rstrip()
