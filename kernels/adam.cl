@@ -1,0 +1,23 @@
+// Adam (Kingma & Ba 2015), one work-item per value, in place.
+//
+// A row (one Gaussian) whose `visible` is 0 is left alone, moments included: an unseen Gaussian
+// has gradient zero in every entry, and stepping it would only let old momentum move it.
+// `lower` bounds the new value: radiance is projected to be >= 0 after the step, which, unlike a
+// clamp in the forward pass, does not stop its gradient.
+// Twin: torch.optim.Adam (all visible). Compile-time: none.
+#line 9 "adam.cl"
+
+__kernel void adam(__global float *values, __global const float *gradients,
+                   __global float *first, __global float *second,
+                   __global const uchar *visible, const int width, const int size,
+                   const float rate, const float beta1, const float beta2, const float epsilon,
+                   const float correction1, const float correction2, const float lower) {
+  const int i = get_global_id(0);
+  if (i >= size || visible[i / width] == 0) return;
+  const float g = gradients[i];
+  const float m = beta1 * first[i] + (1.0f - beta1) * g;
+  const float v = beta2 * second[i] + (1.0f - beta2) * g * g;
+  first[i] = m;
+  second[i] = v;
+  values[i] = fmax(values[i] - rate * (m / correction1) / (sqrt(v / correction2) + epsilon), lower);
+}

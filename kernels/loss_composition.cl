@@ -1,0 +1,62 @@
+// Composition loss and its gradients: |T(Σ_m w_m x_m) - photo|, T(v) = (v + β)^(1/γ), mean over
+// pixels and colours (supplement, L_comp). x holds M rgb images side by side, in units where lamp
+// m has radiance x_m · unit_m; w is [M, 3].
+//
+// Learnt values: params = [w (3M), raw β, raw γ], with β = BETA_MIN + softplus(raw) and
+// γ = GAMMA_MIN + (GAMMA_MAX - GAMMA_MIN) · sigmoid(raw): without the floor and the bounds,
+// (v + β)^(1/γ) has no derivative at v + β = 0 and none that is finite as γ → 0.
+// A photo clips what is brighter than white, so there a brighter composition is no error.
+// Torch twin: luxcore/splats/losses/twin.py::composition_loss.
+// Compile-time: HEIGHT, WIDTH, LIGHTS, BETA_MIN, GAMMA_MIN, GAMMA_MAX, CLIPPED.
+#line 13 "loss_composition.cl"
+
+#define PARAMS (3 * LIGHTS + 2)
+#define COLUMNS (PARAMS + 1)
+
+float sigmoid(float v) { return 1.0f / (1.0f + exp(-v)); }
+float softplus(float v) { return v > 20.0f ? v : log1p(exp(v)); }
+
+// One work-item per image row: adds to d_x [H, W, 3M], writes partials [H, 3M + 3] = gradients of
+// params, then the sum of errors.
+__kernel void composition_rows(__global const float *x, __global const float *photo,
+                               __global const float *params, __global const float *unit,
+                               const float scale, __global float *d_x,
+                               __global float *partials) {
+  const int row = get_global_id(0);
+  const float raw_beta = params[3 * LIGHTS], raw_gamma = params[3 * LIGHTS + 1];
+  const float beta = BETA_MIN + softplus(raw_beta);
+  const float s = sigmoid(raw_gamma);
+  const float gamma = GAMMA_MIN + (GAMMA_MAX - GAMMA_MIN) * s;
+  const float power = 1.0f / gamma;
+  float weight[3 * LIGHTS], sums[COLUMNS];
+  for (int c = 0; c < 3 * LIGHTS; ++c) weight[c] = params[c] * unit[c / 3];
+  for (int c = 0; c < COLUMNS; ++c) sums[c] = 0.0f;
+  for (int col = 0; col < WIDTH; ++col) {
+    const size_t pixel = (size_t)row * WIDTH + col;
+    __global const float *in = x + pixel * 3 * LIGHTS;
+    __global float *out = d_x + pixel * 3 * LIGHTS;
+    for (int k = 0; k < 3; ++k) {
+      float total = 0.0f;
+      for (int m = 0; m < LIGHTS; ++m) total += weight[3 * m + k] * in[3 * m + k];
+      // Weights and radiances below zero may add up to less than -β early in a run.
+      const int live = total > 0.0f;
+      const float v = fmax(total, 0.0f) + beta;
+      const float target = photo[pixel * 3 + k];
+      const float tone = exp(power * log(v));
+      const float error = tone - target;
+      const int ignored = target >= CLIPPED && error > 0.0f;
+      const float d_tone = ignored ? 0.0f : scale * sign(error);
+      const float d_v = d_tone * power * tone / v;
+      for (int m = 0; m < LIGHTS && live; ++m) {
+        out[3 * m + k] += d_v * weight[3 * m + k];
+        sums[3 * m + k] += d_v * unit[m] * in[3 * m + k];
+      }
+      sums[3 * LIGHTS] += d_v;
+      sums[3 * LIGHTS + 1] -= d_tone * tone * log(v) * power * power;
+      sums[PARAMS] += ignored ? 0.0f : fabs(error);
+    }
+  }
+  sums[3 * LIGHTS] *= sigmoid(raw_beta);
+  sums[3 * LIGHTS + 1] *= (GAMMA_MAX - GAMMA_MIN) * s * (1.0f - s);
+  for (int c = 0; c < COLUMNS; ++c) partials[row * COLUMNS + c] = sums[c];
+}
