@@ -1,6 +1,8 @@
 """Photos of a room become cameras, points and undistorted views in one layout."""
 
+from luxcore.capture.ingest import ingest, placed_sentence
 from luxcore.capture.points import Points, read_points, write_points
+from luxcore.capture.rendered import from_rendered
 from luxcore.capture.store import Capture, Frame, Skipped, View, load_capture, write_capture
 
 __all__ = [
@@ -9,7 +11,10 @@ __all__ = [
     "Points",
     "Skipped",
     "View",
+    "from_rendered",
+    "ingest",
     "load_capture",
+    "placed_sentence",
     "read_points",
     "write_capture",
     "write_points",

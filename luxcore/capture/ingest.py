@@ -1,0 +1,127 @@
+"""Whatever the user has of a room (photos, with poses or without) becomes a capture."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from luxcore.capture.colmap_files import find_model, read_model
+from luxcore.capture.names import inside
+from luxcore.capture.nerfstudio import read_nerfstudio
+from luxcore.capture.orientation import room_like
+from luxcore.capture.photo_folder import StagedPhoto, find_photos, stage_photos
+from luxcore.capture.points import Points
+from luxcore.capture.posed import PosedPhoto, to_views
+from luxcore.capture.sfm import solve_poses
+from luxcore.capture.sparse import SparseModel
+from luxcore.capture.store import Capture, Skipped, load_capture, write_capture
+from luxcore.errors import InputError
+from luxcore.files.atomic import atomic_folder
+from luxcore.settings.capture import CaptureSettings
+
+
+def ingest(source: Path, out: Path, settings: CaptureSettings, seed: int) -> Capture:
+    """Write the capture `out` (its name is the id) from `source`, whole or not at all.
+
+    `source` is a capture, a nerfstudio folder, a COLMAP project, or a folder of photos.
+    Raises InputError for what cannot be used, LuxError when too few views can be placed.
+    """
+    source, out = Path(source), Path(out)
+    if not source.is_dir():
+        raise InputError(f"{source} is not a folder.")
+    if (source / "capture.json").is_file():
+        return _copy(source, out)
+    if (source / "transforms.json").is_file():
+        return _from_nerfstudio(source, out, settings)
+    model = find_model(source)
+    if model is not None:
+        return _from_colmap(source, model, out, settings)
+    return _from_photos(source, out, settings, seed)
+
+
+def placed_sentence(capture: Capture) -> str:
+    """For example "19 of 20 views placed (unreadable.jpg: not a readable picture)"."""
+    total = len(capture.frames) + len(capture.skipped)
+    sentence = f"{len(capture.frames)} of {total} views placed"
+    if capture.skipped:
+        sentence += f" ({'; '.join(f'{s.name}: {s.reason}' for s in capture.skipped)})"
+    return sentence
+
+
+def _copy(source: Path, out: Path) -> Capture:
+    load_capture(source)
+    with atomic_folder(out) as temporary:
+        shutil.copytree(source, temporary, dirs_exist_ok=True)
+    return load_capture(out)
+
+
+def _from_nerfstudio(source: Path, out: Path, settings: CaptureSettings) -> Capture:
+    photos, points = read_nerfstudio(source / "transforms.json")
+    views = to_views(photos, settings.image_side)
+    return write_capture(out, out.name, views, points, source="nerfstudio", metric=False)
+
+
+def _from_colmap(source: Path, model: Path, out: Path, settings: CaptureSettings) -> Capture:
+    root = next(f for f in (source / "images", source) if f.is_dir())
+    sparse = read_model(model, root)
+    files = {image.name: inside(root, image.name, model) for image in sparse.images}
+    return _write(sparse, files, {}, out, settings, "colmap", [])
+
+
+def _from_photos(source: Path, out: Path, settings: CaptureSettings, seed: int) -> Capture:
+    photos = find_photos(source)
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        (work / "images").mkdir()
+        staged, skipped = stage_photos(photos, work / "images", settings.image_side)
+        _check_enough(source, staged, skipped, settings)
+        sparse = read_model(solve_poses(staged, work, settings, seed), work / "images")
+        placed = {image.name for image in sparse.images}
+        unplaced = [p for p in staged if p.path.name not in placed]
+        skipped += [Skipped(p.name, "could not be placed") for p in unplaced]
+        files = {p.path.name: p.path for p in staged}
+        names = {p.path.name: p.name for p in staged}
+        return _write(sparse, files, names, out, settings, "photos", skipped)
+
+
+def _check_enough(
+    source: Path, staged: list[StagedPhoto], skipped: list[Skipped], settings: CaptureSettings
+) -> None:
+    if len(staged) >= settings.min_views:
+        return
+    unusable = f" and {len(skipped)} unusable ({skipped[0].name}: {skipped[0].reason})"
+    raise InputError(
+        f"{source} holds {len(staged)} readable photo{'s' * (len(staged) != 1)}"
+        f"{unusable if skipped else ''}; at least {settings.min_views} are needed."
+    )
+
+
+def _write(
+    sparse: SparseModel,
+    files: dict[str, Path],
+    names: dict[str, str],
+    out: Path,
+    settings: CaptureSettings,
+    source: str,
+    skipped: list[Skipped],
+) -> Capture:
+    """COLMAP's world has neither up nor metres: turn it upright and scale it like a room."""
+    c2w = np.stack([np.linalg.inv(image.w2c) for image in sparse.images])
+    world = room_like(c2w, sparse.points.xyz.astype(float))
+    xyz = world.points(sparse.points.xyz.astype(float)).astype(np.float32)
+    photos = [
+        PosedPhoto(names.get(i.name, i.name), files[i.name], i.lens, world.pose(pose))
+        for i, pose in zip(sparse.images, c2w, strict=True)
+    ]
+    return write_capture(
+        out,
+        out.name,
+        to_views(photos, settings.image_side),
+        Points(xyz, sparse.points.rgb),
+        source=source,
+        metric=False,
+        skipped=skipped,
+    )
