@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 # Prefect reads these at import; a run must not depend on a server elsewhere or phone home.
 os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
@@ -52,7 +53,7 @@ def pipeline(stages: list[str] | None = None, root: str = ".") -> list[str]:
 
 def run_pipeline(root: Path, stages: list[str] | None, stages_at_once: int) -> list[str]:
     """Run the flow with at most `stages_at_once` stages side by side."""
-    runner: ThreadPoolTaskRunner[State] = ThreadPoolTaskRunner(max_workers=stages_at_once)
+    runner: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=stages_at_once)
     return pipeline.with_options(task_runner=runner)(stages, str(root))
 
 

@@ -6,12 +6,13 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 LINE_EVERY_S = 10.0
 """Seconds between plain lines when the output is a file: enough to see life, no flood."""
 
 
+@runtime_checkable
 class Bar(Protocol):
     """What a long computation reports to."""
 

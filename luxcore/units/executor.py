@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from luxcore.errors import InputError
 
@@ -19,6 +19,7 @@ Outcome = tuple[int, Any]
 """Index of the call, and what it returned."""
 
 
+@runtime_checkable
 class Executor(Protocol):
     """Runs `function(*arguments)` for each row and yields outcomes as they finish."""
 
