@@ -1,0 +1,1 @@
+"""Scores of a predicted image against the truth, as the paper reports them."""

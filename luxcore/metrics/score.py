@@ -1,0 +1,52 @@
+"""All scores of one predicted light against the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from luxcore.light.agx import agx
+from luxcore.metrics.image import psnr, ssim
+from luxcore.metrics.lpips import lpips
+from luxcore.metrics.rescale import channel_scale
+
+LOG_FLOOR = 1e-3
+"""Exposed radiance below this counts as dark in the logarithmic error."""
+
+Image = Float[np.ndarray, "h w 3"]
+
+
+def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) -> dict:
+    """PSNR, SSIM and LPIPS on AgX display images after the channel-wise rescale, and unscaled.
+
+    `exposure` is the capture's g: images are AgX(g · I), both linear radiance. Keys: psnr, ssim,
+    lpips (None where unavailable), psnr_unscaled, ssim_unscaled, log_rmse (stops, rescaled linear
+    HDR). Values of the prediction that are not finite count as black.
+    """
+    predicted = np.nan_to_num(np.asarray(predicted_linear, np.float32), posinf=0.0, neginf=0.0)
+    truth = np.asarray(truth_linear, np.float32)
+    scaled = predicted * channel_scale(predicted, truth).astype(np.float32)
+    shown, plain, target = (_display(i, exposure) for i in (scaled, predicted, truth))
+    return {
+        "psnr": psnr(shown, target),
+        "ssim": ssim(shown, target),
+        "lpips": lpips(shown, target),
+        "psnr_unscaled": psnr(plain, target),
+        "ssim_unscaled": ssim(plain, target),
+        "log_rmse": log_rmse(scaled * exposure, truth * exposure),
+    }
+
+
+def score_display(shown: Image, target: Image) -> dict:
+    """PSNR, SSIM and LPIPS of two display images in 0..1, without any rescale."""
+    return {"psnr": psnr(shown, target), "ssim": ssim(shown, target), "lpips": lpips(shown, target)}
+
+
+def log_rmse(predicted: Image, truth: Image) -> float:
+    """Root mean square difference in stops (log2) of exposed linear images, floored at 1e-3."""
+    stops = [np.log2(np.maximum(i, 0.0).astype(np.float64) + LOG_FLOOR) for i in (predicted, truth)]
+    return float(np.sqrt(np.mean((stops[0] - stops[1]) ** 2)))
+
+
+def _display(linear: Image, exposure: float) -> Image:
+    return np.asarray(agx(linear * np.float32(exposure)), np.float32)
