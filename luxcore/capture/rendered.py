@@ -32,8 +32,12 @@ def from_rendered(render_demo_dir: Path, out: Path, settings: CaptureSettings) -
     Raises InputError when there are none, FormatError when a view is incomplete.
     """
     views = rendered_views(render_demo_dir)
-    about = read_object(views[0])
-    photos = [_photo(path) for path in views]
+    abouts = [read_object(path) for path in views]
+    # One exposure for the whole capture, as a photographer who wants to compare views sets it.
+    exposure = float(
+        np.median([_number(p, a, "exposure") for p, a in zip(views, abouts, strict=True)])
+    )
+    photos = [_photo(path, exposure) for path in views]
     return write_capture(
         out,
         Path(out).name,
@@ -41,8 +45,8 @@ def from_rendered(render_demo_dir: Path, out: Path, settings: CaptureSettings) -
         _points(views, photos, settings.points),
         source="rendered",
         metric=True,
-        exposure=_number(views[0], about, "exposure"),
-        write_truth=lambda folder: _write_truth(folder, views, about),
+        exposure=exposure,
+        write_truth=lambda folder: _write_truth(folder, views, abouts[0], exposure),
     )
 
 
@@ -67,10 +71,10 @@ def input_linear(path: Path, about: dict[str, Any], layers: Layers) -> Float[np.
     return image
 
 
-def _photo(path: Path) -> View:
+def _photo(path: Path, exposure: float) -> View:
     about = read_object(path)
     light = input_linear(path, about, read_exr(path.with_suffix(".exr")))
-    photo = agx(light * np.float32(_number(path, about, "exposure")))
+    photo = agx(light * np.float32(exposure))
     return View(f"{path.stem}.png", photo, _camera(path, about))
 
 
@@ -87,14 +91,14 @@ def _points(views: list[Path], photos: list[View], limit: int) -> Points:
     return Points(np.concatenate(xyz), np.concatenate(rgb))
 
 
-def _write_truth(folder: Path, views: list[Path], about: dict[str, Any]) -> None:
+def _write_truth(folder: Path, views: list[Path], about: dict[str, Any], exposure: float) -> None:
     for index, path in enumerate(views):
         for kind in (".exr", ".geometry.exr", ".masks.exr"):
             origin = path.with_name(path.stem + kind)
             if not origin.is_file():
                 raise InputError(f"{origin} does not exist.")
             shutil.copyfile(origin, folder / f"{index:04d}{kind}")
-    lights = {"exposure": about["exposure"], "lamps": about["lamps"], "room": about.get("room")}
+    lights = {"exposure": exposure, "lamps": about["lamps"], "room": about.get("room")}
     write_json(folder / "lights.json", lights)
 
 

@@ -1,0 +1,117 @@
+"""Masks that need not be guessed: a rendered room's own, or a folder that the user drew."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from luxcore.capture.store import Capture, read_object
+from luxcore.errors import FormatError, InputError
+from luxcore.files.exr import read_exr
+from luxcore.files.photos import read_mask, read_photo
+from luxcore.masks.references import best_views, photo_sharpness
+from luxcore.masks.store import FoundLamp, Mask
+from luxcore.settings.masks import MasksSettings
+
+_NAME = re.compile(r"(\d{4})_(\d{2})\.png")
+
+ON_RATIO = 1.5
+"""A lamp whose brightest pixels are this much brighter than the median photo pixel is on."""
+
+
+def truth_lamps(capture: Capture, settings: MasksSettings) -> list[FoundLamp]:
+    """The lamps of a rendered room that any view sees, by their fixtures.
+
+    Raises InputError when the capture has no truth, FormatError when that is incomplete.
+    """
+    if capture.truth is None:
+        raise InputError(f"{capture.root} has no truth to take masks from.")
+    about = read_object(capture.truth / "lights.json")
+    lamps: list[dict[str, Any]] = about.get("lamps", [])
+    masks: list[dict[int, Mask]] = [{} for _ in lamps]
+    for view in range(len(capture.frames)):
+        path = capture.truth / f"{view:04d}.masks.exr"
+        layers = read_exr(path)
+        for light, seen in enumerate(masks):
+            mask = _truth_mask(path, layers, light)
+            if mask.mean() >= settings.min_area:
+                seen[view] = mask
+    sharpness = capture_sharpness(capture)
+    return [
+        FoundLamp(
+            name=str(lamp.get("name", f"lamp_{light}")),
+            on=bool(lamp["on"]),
+            masks=seen,
+            references=best_views(seen, sharpness, settings.references),
+            truth_light=light,
+        )
+        for light, (lamp, seen) in enumerate(zip(lamps, masks, strict=True))
+        if seen
+    ]
+
+
+def folder_lamps(capture: Capture, folder: Path, settings: MasksSettings) -> list[FoundLamp]:
+    """The user's `NNNN_LL.png` masks (view, lamp). On or off is judged from the photos.
+
+    Raises InputError for a name, view, size or mask that cannot be used.
+    """
+    files = _user_files(folder, len(capture.frames))
+    sharpness = capture_sharpness(capture)
+    lamps: dict[int, dict[int, Mask]] = {}
+    for view, lamp, path in files:
+        camera = capture.frames[view].camera
+        mask = read_mask(path, (camera.height, camera.width))
+        lamps.setdefault(lamp, {})[view] = mask
+    return [
+        FoundLamp(
+            name=f"lamp_{index}",
+            on=_looks_on(capture, lamps[key]),
+            masks=lamps[key],
+            references=best_views(lamps[key], sharpness, settings.references),
+        )
+        for index, key in enumerate(sorted(lamps))
+    ]
+
+
+def capture_sharpness(capture: Capture) -> dict[int, float]:
+    """Sharpness of every view's photo."""
+    photos = (read_photo(frame.image_path) for frame in capture.frames)
+    return {view: photo_sharpness(photo) for view, photo in enumerate(photos)}
+
+
+def _truth_mask(path: Path, layers: dict[str, np.ndarray], light: int) -> Mask:
+    for kind in ("fixture", "emitter"):
+        layer = layers.get(f"{kind}_{light:02d}")
+        if layer is None:
+            raise FormatError(f"{path} lacks the part {kind}_{light:02d}.")
+        mask = layer[..., 0] > 0.5
+        if mask.any():
+            break
+    return mask
+
+
+def _user_files(folder: Path, views: int) -> Iterator[tuple[int, int, Path]]:
+    folder = Path(folder)
+    files = sorted(folder.glob("*.png")) if folder.is_dir() else []
+    if not files:
+        raise InputError(f"{folder} holds no masks named NNNN_LL.png (view, lamp).")
+    for path in files:
+        match = _NAME.fullmatch(path.name)
+        if match is None:
+            raise InputError(f"{path} is not named NNNN_LL.png (view, lamp).")
+        view, lamp = int(match[1]), int(match[2])
+        if view >= views:
+            raise InputError(f"{path} is for view {view}, the capture has {views} views.")
+        yield view, lamp, path
+
+
+def _looks_on(capture: Capture, masks: dict[int, Mask]) -> bool:
+    ratios = []
+    for view, mask in masks.items():
+        grey = read_photo(capture.frames[view].image_path).mean(axis=2)
+        ratios.append(np.percentile(grey[mask], 90) / max(float(np.median(grey)), 1e-3))
+    return bool(np.median(ratios) >= ON_RATIO)
