@@ -48,11 +48,15 @@ class Adam:
         gradients: cla.Array,
         visible: cla.Array,
         rate: float,
+        *,
         lower: float = -np.inf,
+        head: int | None = None,
+        tail_rate: float = 0.0,
     ) -> None:
         """One step of the array called `name`, [n, …]; `visible` is [n] uint8.
 
-        New values are never below `lower` (projection after the step).
+        New values are never below `lower` (projection after the step). With `head`, both hold for
+        the first `head` values of each row; the others step by `tail_rate`, unbounded.
         """
         if not values.size:
             return
@@ -61,14 +65,30 @@ class Adam:
             zeros = (self.device.zeros(values.shape) for _ in range(2))
             moments = self.moments[name] = Moments(*zeros)
         s = self.settings
+        width = values.size // values.shape[0]
         self._kernel(
             self.device.queue, (values.size,), None, values.data, gradients.data,
             moments.first.data, moments.second.data, visible.data,
-            np.int32(values.size // values.shape[0]), np.int32(values.size), np.float32(rate),
+            np.int32(width), np.int32(values.size), np.int32(width if head is None else head),
+            np.float32(rate), np.float32(tail_rate),
             np.float32(s.beta1), np.float32(s.beta2), np.float32(s.epsilon),
             np.float32(1 - s.beta1**self.steps), np.float32(1 - s.beta2**self.steps),
             np.float32(lower),
         )  # fmt: skip
+
+    def rearrange(self, parents: np.ndarray, fresh: np.ndarray) -> None:
+        """Follow an edit of the population: row i continues `parents[i]`, or afresh."""
+        for name, moments in self.moments.items():
+            rows = []
+            for array in (moments.first.get(), moments.second.get()):
+                moved = array[parents]
+                moved[fresh] = 0
+                rows.append(self.device.array(moved))
+            self.moments[name] = Moments(*rows)
+
+    def forget(self, name: str) -> None:
+        """Drop the moments of an array whose shape changes."""
+        self.moments.pop(name, None)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything `load` needs, on the host."""
