@@ -2,8 +2,27 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from luxcore.settings.base import Settings
+
+TEST_SEED_BASE = 900_000
+"""Rooms from this seed on are held out: training never draws them."""
 
 
 class RoomsSettings(Settings):
-    """Knobs of the rooms stage."""
+    """How many rooms, and what may be in them."""
+
+    train: int = Field(3, ge=0, le=TEST_SEED_BASE, description="training rooms")
+    test: int = Field(1, ge=0, le=100_000, description="held-out rooms")
+    first_seed: int = Field(
+        0, ge=0, lt=TEST_SEED_BASE, description="seed of the first training room"
+    )
+    demo_seed: int = Field(7, ge=0, lt=TEST_SEED_BASE, description="seed of the demo room")
+    max_lamps: int = Field(6, ge=1, le=6, description="controllable lamps a room (the paper: 6)")
+    off_probability: float = Field(
+        0.2, ge=0, le=1, description="chance that a lamp is off in the input photo"
+    )
+    hdri_folder: str = Field(
+        "", description="folder of .exr or .hdr environments; empty: Blender's own"
+    )

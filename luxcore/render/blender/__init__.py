@@ -1,0 +1,1 @@
+"""What runs inside the Blender process, and only there: nothing else may import bpy."""

@@ -1,0 +1,40 @@
+"""The Blender process: one JSON request a line on stdin, one JSON answer a line on stdout.
+
+`python -m luxcore.render.blender.server`. Blender prints to file descriptor 1, so the answers use
+a copy of it taken before Blender starts. Ends when stdin closes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+
+def main() -> None:
+    """Serve requests until the parent goes away."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    import bpy
+
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
+    from luxcore.render.blender.job import RenderJob
+
+    job = RenderJob()
+    for line in sys.stdin:
+        answers.write(json.dumps(_answer(job, json.loads(line))) + "\n")
+        answers.flush()
+
+
+def _answer(job: Any, request: dict[str, Any]) -> dict[str, Any]:
+    try:
+        return {"ok": job.render(request, Path(request["out_dir"]))}
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
+
+
+if __name__ == "__main__":
+    main()

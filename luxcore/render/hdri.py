@@ -1,0 +1,45 @@
+"""Where environments come from: the CC0 HDRIs inside Blender's own package, or a file by path."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from luxcore.errors import InputError
+from luxcore.files.exr import read_exr_image
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+
+@cache
+def blender_hdri_folder() -> Path:
+    """`datafiles/studiolights/world` of the bpy package, found without importing it."""
+    spec = importlib.util.find_spec("bpy")
+    root = Path(spec.origin).parent if spec is not None and spec.origin else Path("bpy")
+    found = sorted(root.glob("*/datafiles/studiolights/world"))
+    if not found:
+        raise InputError(f"{root} holds no datafiles/studiolights/world: is bpy installed?")
+    return found[-1]
+
+
+def hdri_path(name: str) -> Path:
+    """A file for the name of an environment: Blender's by stem ("courtyard"), else a path."""
+    path = Path(name) if name.endswith((".exr", ".hdr")) else blender_hdri_folder() / f"{name}.exr"
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: no such environment.")
+    return path
+
+
+@cache
+def mean_luminance(path: Path) -> float:
+    """The mean radiance of an equirectangular HDRI over the sphere, as luminance."""
+    luminance = read_exr_image(path) @ LUMINANCE
+    height = luminance.shape[0]
+    weight = np.cos(np.pi * (0.5 - (np.arange(height) + 0.5) / height))
+    mean = float((luminance.mean(axis=1) * weight).sum() / weight.sum())
+    if not mean > 0:
+        raise InputError(f"{path} is black: an environment must give light.")
+    return mean

@@ -1,0 +1,46 @@
+"""One unit of work: one view of one room, rendered into a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from luxcore.render.process import shared_blender
+from luxcore.render.views import View, view_to_json
+from luxcore.rooms.model import Room
+from luxcore.settings.render import RenderSettings
+
+RENDER_CODE_VERSION = 1
+"""Raised when the same room would give other pixels, so that old units are not reused."""
+
+
+def view_job(
+    room: Room, view: View, settings: RenderSettings, *, name: str, spp: int, number: int = 0
+) -> dict[str, Any]:
+    """The JSON arguments of `render_unit`. `number` tells the views of a room apart (noise)."""
+    return {
+        "room": room.to_json(),
+        "view": view_to_json(view),
+        "name": name,
+        "spp": spp,
+        "seed": room.seed * 1009 + number,
+        "denoise": settings.denoise,
+        "timeout_s": settings.timeout_s,
+    }
+
+
+def render_unit(out_dir: Path, *, threads: int = 1, timeout_s: float, **job: Any) -> dict[str, Any]:
+    """Write the compact form of one view into `out_dir`; returns CPU seconds by step.
+
+    Pixels do not depend on `threads`. Raises LuxError when Blender fails or takes too long.
+    """
+    out_dir.mkdir(parents=True, exist_ok=True)
+    request = {**job, "threads": threads, "out_dir": str(out_dir.absolute())}
+    return shared_blender().request(request, timeout_s)
+
+
+def render_view(
+    room: Room, view: View, settings: RenderSettings, out_dir: Path, *, name: str = "0000"
+) -> dict[str, Any]:
+    """Render one view of a room without the unit store; files as in `luxcore.render.compact`."""
+    return render_unit(out_dir, **view_job(room, view, settings, name=name, spp=settings.spp))

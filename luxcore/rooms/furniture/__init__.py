@@ -1,0 +1,1 @@
+"""Furniture built of recognisable parts; every function draws one `Piece` from a generator."""
