@@ -26,13 +26,13 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PATH": path, "PYTHONUNBUFFERED": "1"}
 
 
-def stale_reasons(root: Path, stage: str) -> list[str]:
-    """Why DVC would run `stage`, one phrase each; empty where it is up to date."""
-    done = _dvc(root, "status", "--json", stage)
+def stale_stages(root: Path) -> dict[str, list[str]]:
+    """Stage → why DVC would run it, one phrase each. Stages that are up to date are not in it."""
+    done = _dvc(root, "status", "--json")
     if done.returncode != 0:
-        raise LuxError(f"dvc status {stage} failed: {_last_line(done.stderr)}")
-    entries = json.loads(done.stdout or "{}").get(stage, [])
-    return reason_phrases(entries)
+        raise LuxError(f"dvc status failed: {_last_line(done.stderr)}")
+    status = json.loads(done.stdout or "{}")
+    return {name: reason_phrases(entries) for name, entries in status.items()}
 
 
 def reason_phrases(entries: list[Any]) -> list[str]:
@@ -40,8 +40,12 @@ def reason_phrases(entries: list[Any]) -> list[str]:
     return [phrase for entry in entries for phrase in _entry_phrases(entry)]
 
 
-def reproduce(root: Path, stage: str) -> None:
-    """Run one stage under DVC, its output passed through. Raises LuxError where it fails."""
+def reproduce(root: Path, stage: str) -> str:
+    """Run one stage under DVC, its output passed through.
+
+    Returns "ran", "cached" (taken from the run cache) or "unchanged". Raises LuxError where the
+    stage fails.
+    """
     keep_lock_copy(root)
     command = [*_DVC, "--wait-for-lock", "repro", "--single-item", stage]
     while True:
@@ -49,13 +53,14 @@ def reproduce(root: Path, stage: str) -> None:
             command,
             cwd=root,
             env=environment(),
-            stderr=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             text=True,
             preexec_fn=die_with_parent,
         )
         tail = _forward(process)
         if process.returncode == 0:
-            return
+            return _outcome(tail)
         if BUSY not in tail:
             raise LuxError(f"stage {stage} failed: {_stage_error(tail)}")
         print(f"stage {stage} is being run by another process; waiting.", file=sys.stderr)
@@ -86,11 +91,11 @@ def _dvc(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def _forward(process: subprocess.Popen[str]) -> str:
-    """Copy the child's standard error here line by line; returns its last lines."""
+    """Copy the child's output to standard error line by line; returns its last lines."""
     lines: list[str] = []
-    assert process.stderr is not None
+    assert process.stdout is not None
     try:
-        for line in process.stderr:
+        for line in process.stdout:
             sys.stderr.write(line)
             lines = [*lines[-40:], line]
         process.wait()
@@ -98,6 +103,12 @@ def _forward(process: subprocess.Popen[str]) -> str:
         process.send_signal(signal.SIGTERM)
         raise
     return "".join(lines)
+
+
+def _outcome(tail: str) -> str:
+    if "didn't change, skipping" in tail:
+        return "unchanged"
+    return "cached" if "is cached - skipping run" in tail else "ran"
 
 
 def _stage_error(tail: str) -> str:

@@ -20,22 +20,22 @@ from prefect.states import Completed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows.dag import Stage, ordered
-from flows.dvc_runner import reproduce, stale_reasons
+from flows.dvc_runner import reproduce, stale_stages
 from flows.tracking import flow_run
 from luxcore.errors import LuxError
 
 RETRY_DELAY_S = 5
+_STATE_NAMES = {"ran": "Completed", "cached": "Cached", "unchanged": "Skipped"}
 
 
 @task(cache_policy=NO_CACHE, persist_result=False, task_run_name="{name}")
-def stage_task(name: str, does: str, root: str) -> State:
-    """Run one stage if DVC finds it stale; otherwise complete as "Skipped" with the reason."""
-    reasons = stale_reasons(Path(root), name)
-    if not reasons:
+def stage_task(name: str, does: str, root: str, why: str) -> State:
+    """Let DVC run one stage; `why` is the reason it was found stale, empty where it is fresh."""
+    if not why:
         return Completed(name="Skipped", message="up to date: nothing that it depends on changed")
-    get_run_logger().info("%s (%s), because: %s", name, does, "; ".join(reasons))
-    reproduce(Path(root), name)
-    return Completed(message="; ".join(reasons)[:500])
+    get_run_logger().info("%s (%s), because: %s", name, does, why)
+    outcome = reproduce(Path(root), name)
+    return Completed(name=_STATE_NAMES[outcome], message=why[:500])
 
 
 @flow(name="luxremix", persist_result=False, validate_parameters=False)
@@ -53,23 +53,33 @@ def pipeline(stages: list[str] | None = None, root: str = ".") -> list[str]:
 
 def run_pipeline(root: Path, stages: list[str] | None, stages_at_once: int) -> list[str]:
     """Run the flow with at most `stages_at_once` stages side by side."""
-    runner: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=stages_at_once)
+    runner: Any = ThreadPoolTaskRunner(max_workers=stages_at_once)
     return pipeline.with_options(task_runner=runner)(stages, str(root))
 
 
 def _submit(chosen: list[Stage], root: str) -> dict[str, State]:
+    stale = {name: "; ".join(reasons) for name, reasons in stale_stages(Path(root)).items()}
     futures: dict[str, PrefectFuture[State]] = {}
     for stage in chosen:
+        why = stale.setdefault(stage.name, _upstream_reason(stage, stale))
         retrying = stage_task.with_options(retries=stage.retries, retry_delay_seconds=RETRY_DELAY_S)
-        upstream = [futures[name] for name in stage.needs if name in futures]
         futures[stage.name] = retrying.submit(  # type: ignore[call-overload]
-            stage.name, stage.does, root, wait_for=upstream
+            stage.name,
+            stage.does,
+            root,
+            why,
+            wait_for=[futures[name] for name in stage.needs if name in futures],
         )
     states: dict[str, State] = {}
     for name, future in futures.items():
         future.wait()
         states[name] = future.state
     return states
+
+
+def _upstream_reason(stage: Stage, stale: dict[str, str]) -> str:
+    changing = [name for name in stage.needs if stale.get(name)]
+    return f"{', '.join(changing)} will change" if changing else ""
 
 
 def _publish(root: Path, states: dict[str, State]) -> None:

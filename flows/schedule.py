@@ -11,11 +11,10 @@ import urllib.request
 from pathlib import Path
 
 from luxcore.errors import LuxError
-from tasks.process import die_with_parent, stage_lock
+from tasks.process import die_with_parent
 
 HOST = "127.0.0.1"
 SERVER_START_S = 120
-SERVED_LOCK = "schedule"
 
 
 def serve(root: Path, cron: str, stages: list[str] | None, worktree: Path | None) -> None:
@@ -47,19 +46,13 @@ def prepare_worktree(root: Path, place: Path) -> None:
 
 
 def run_in_worktree(root: Path, worktree: Path, stages: list[str] | None) -> str:
-    """One scheduled run. Where the last is still running, say so and do nothing."""
+    """Bring the worktree's artifacts up to date with the project's present commit."""
     from flows.pipeline import pipeline
 
-    try:
-        with stage_lock(root, SERVED_LOCK):
-            prepare_worktree(root, worktree)
-            os.environ["LUX_UNITS"] = str(root / ".lux" / "units")
-            done = pipeline(stages, str(worktree))
-            return f"{len(done)} stages are up to date in {worktree}."
-    except LuxError as error:
-        if "already running" not in str(error):
-            raise
-        return f"the previous build is still running: {error}"
+    prepare_worktree(root, worktree)
+    os.environ["LUX_UNITS"] = str(root / ".lux" / "units")
+    done = pipeline(stages, str(worktree))
+    return f"{len(done)} stages are up to date in {worktree}."
 
 
 def start_server(root: Path) -> subprocess.Popen[bytes]:
