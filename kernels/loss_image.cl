@@ -6,8 +6,9 @@
 // separable: blur_columns, then a row pass. Row passes read padded rows (PAD zeros on both sides,
 // written never), so that taps at distance k·C need no test. Moments are E[x], E[x²], E[y], E[y²],
 // E[xy]. Torch twin: luxcore/splats/losses/twin.py::image_loss.
-// Compile-time: HEIGHT, ROW (= W·C), CHANNELS, PAD (>= 5·C), STRIDE (padded row, multiple of 16).
-#line 13 "loss_image.cl"
+// Compile-time: HEIGHT, ROW (= W·C), CHANNELS, PAD (>= 5·C), STRIDE (padded row),
+// BLOCKS (work-items per row).
+#line 14 "loss_image.cl"
 
 #define RADIUS 5
 #define C1 1e-4f
@@ -50,7 +51,7 @@ float16 blur_row(__global const float *padded_row, int i) {
 // Vertical blur of x, x², y, y², xy into `moments` [5, H, STRIDE].
 __kernel void moments_columns(__global const float *x, __global const float *y,
                               __global float *moments) {
-  const int i = get_global_id(0) * 16, row = get_global_id(1);
+  const int i = (get_global_id(0) % BLOCKS) * 16, row = get_global_id(0) / BLOCKS;
   float16 m0 = 0.0f, m1 = 0.0f, m2 = 0.0f, m3 = 0.0f, m4 = 0.0f;
   for (int k = max(-RADIUS, -row); k <= min(RADIUS, HEIGHT - 1 - row); ++k) {
     const float w = WINDOW[k + RADIUS];
@@ -75,7 +76,7 @@ __kernel void moments_columns(__global const float *x, __global const float *y,
 // `partials` [3, H, ROW]; sum of SSIM per work-item: `sums` [H, BLOCKS].
 __kernel void ssim_rows(__global const float *moments, __global float *partials,
                         __global float *sums) {
-  const int i = get_global_id(0) * 16, row = get_global_id(1);
+  const int i = (get_global_id(0) % BLOCKS) * 16, row = get_global_id(0) / BLOCKS;
   const size_t plane = (size_t)HEIGHT * STRIDE;
   __global const float *in = moments + (size_t)row * STRIDE;
   const float16 mx = blur_row(in, i), my = blur_row(in + 2 * plane, i);
@@ -104,12 +105,12 @@ __kernel void ssim_rows(__global const float *moments, __global float *partials,
   store_row(d_cxy, out + 2 * size, i);
   float16 inside = ssim;
   for (int k = max(ROW - i, 0); k < 16; ++k) ((float *)&inside)[k] = 0.0f;
-  sums[row * get_global_size(0) + get_global_id(0)] = sum16(inside);
+  sums[get_global_id(0)] = sum16(inside);
 }
 
 // Vertical blur of the three partials into padded planes [3, H, STRIDE].
 __kernel void partials_columns(__global const float *partials, __global float *padded) {
-  const int i = get_global_id(0) * 16, row = get_global_id(1);
+  const int i = (get_global_id(0) % BLOCKS) * 16, row = get_global_id(0) / BLOCKS;
   const size_t size = (size_t)HEIGHT * ROW;
   float16 p0 = 0.0f, p1 = 0.0f, p2 = 0.0f;
   for (int k = max(-RADIUS, -row); k <= min(RADIUS, HEIGHT - 1 - row); ++k) {
@@ -130,7 +131,7 @@ __kernel void partials_columns(__global const float *partials, __global float *p
 __kernel void gradient_rows(__global const float *x, __global const float *y,
                             __global const float *padded, const float l1_scale,
                             const float ssim_scale, __global float *d_x, __global float *sums) {
-  const int i = get_global_id(0) * 16, row = get_global_id(1);
+  const int i = (get_global_id(0) % BLOCKS) * 16, row = get_global_id(0) / BLOCKS;
   const size_t plane = (size_t)HEIGHT * STRIDE;
   __global const float *in = padded + (size_t)row * STRIDE;
   const float16 a = load_row(x + (size_t)row * ROW, i);
@@ -138,15 +139,15 @@ __kernel void gradient_rows(__global const float *x, __global const float *y,
   const float16 ssim = blur_row(in, i) + 2.0f * a * blur_row(in + plane, i) +
                        b * blur_row(in + 2 * plane, i);
   store_row(ssim_scale * ssim + l1_scale * sign(a - b), d_x + (size_t)row * ROW, i);
-  sums[row * get_global_size(0) + get_global_id(0)] = sum16(fabs(a - b));
+  sums[get_global_id(0)] = sum16(fabs(a - b));
 }
 
 // L1 alone, for runs that ask for no D-SSIM: the same outputs as gradient_rows.
 __kernel void gradient_l1(__global const float *x, __global const float *y, const float l1_scale,
                           __global float *d_x, __global float *sums) {
-  const int i = get_global_id(0) * 16, row = get_global_id(1);
+  const int i = (get_global_id(0) % BLOCKS) * 16, row = get_global_id(0) / BLOCKS;
   const float16 a = load_row(x + (size_t)row * ROW, i);
   const float16 b = load_row(y + (size_t)row * ROW, i);
   store_row(l1_scale * sign(a - b), d_x + (size_t)row * ROW, i);
-  sums[row * get_global_size(0) + get_global_id(0)] = sum16(fabs(a - b));
+  sums[get_global_id(0)] = sum16(fabs(a - b));
 }

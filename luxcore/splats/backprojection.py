@@ -37,5 +37,5 @@ def view_directions(
     means: Float32[np.ndarray, "n 3"], camera: Camera
 ) -> Float32[np.ndarray, "n 3"]:
     """Unit vectors from the camera to each mean."""
-    offset = means - camera.centre.astype(np.float32)
+    offset: np.ndarray = means - camera.centre.astype(np.float32)
     return offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-12)

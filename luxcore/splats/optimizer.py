@@ -66,14 +66,10 @@ class Adam:
             moments = self.moments[name] = Moments(*zeros)
         s = self.settings
         width = values.size // values.shape[0]
-        self._kernel(
-            self.device.queue, (values.size,), None, values.data, gradients.data,
-            moments.first.data, moments.second.data, visible.data,
-            np.int32(width), np.int32(values.size), np.int32(width if head is None else head),
-            np.float32(rate), np.float32(tail_rate),
-            np.float32(s.beta1), np.float32(s.beta2), np.float32(s.epsilon),
-            np.float32(1 - s.beta1**self.steps), np.float32(1 - s.beta2**self.steps),
-            np.float32(lower),
+        self.device.launch(
+            self._kernel, values.size, values, gradients, moments.first, moments.second, visible,
+            width, values.size, width if head is None else head, rate, tail_rate, s.beta1, s.beta2,
+            s.epsilon, 1 - s.beta1**self.steps, 1 - s.beta2**self.steps, lower,
         )  # fmt: skip
 
     def rearrange(self, parents: np.ndarray, fresh: np.ndarray) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float, Int
 
 from luxcore.splats.density.strategy import Edit
 from luxcore.splats.device import Device
@@ -48,26 +48,23 @@ class McmcStrategy:
 
     def before_step(self, model: DeviceGaussians, gradients: RasterGradients) -> None:
         """Add the gradients of mean opacity and mean scale."""
-        n = model.count
-        if n:
-            self._kernels.mcmc_regularize(
-                self.device.queue, (n,), None, model.opacity_logits.data, model.log_scales.data,
-                np.int32(n), np.float32(self.settings.opacity_weight / n),
-                np.float32(self.settings.scale_weight / (3 * n * self.extent)),
-                gradients.opacity_logits.data, gradients.log_scales.data,
-            )  # fmt: skip
+        n, s = model.count, self.settings
+        self.device.launch(
+            self._kernels.mcmc_regularize, n, model.opacity_logits, model.log_scales, n,
+            s.opacity_weight / max(n, 1), s.scale_weight / (3 * max(n, 1) * self.extent),
+            gradients.opacity_logits, gradients.log_scales,
+        )  # fmt: skip
 
     def after_step(
         self, model: DeviceGaussians, out: RasterOutput, gradients: RasterGradients, iteration: int
     ) -> None:
         """Shake the means, faint Gaussians most, until `stop`."""
         n, s = model.count, self.settings
-        if n and iteration < s.stop:
-            self._kernels.mcmc_noise(
-                self.device.queue, (n,), None, model.means.data, model.quats.data,
-                model.log_scales.data, model.opacity_logits.data, np.int32(n),
+        if iteration < s.stop:
+            self.device.launch(
+                self._kernels.mcmc_noise, n, *model.geometry, n,
                 np.uint32(self._seed & 0xFFFFFFFF), np.uint32(iteration),
-                np.float32(s.noise_rate * self._means_rate),
+                s.noise_rate * self._means_rate,
             )  # fmt: skip
 
     def refine(
@@ -145,11 +142,9 @@ def _blend_sum(
     return np.maximum(total, 1e-12)
 
 
-def regularizer(
-    gaussians: Gaussians, settings: McmcSettings, extent: float
-) -> Float32[np.ndarray, ""]:
+def regularizer(gaussians: Gaussians, settings: McmcSettings, extent: float) -> float:
     """Twin of `before_step`, which adds its gradient: w_o mean(o) + w_s mean(scale) / extent."""
     scales = np.exp(gaussians.log_scales).mean() / extent
-    return np.float32(
+    return float(
         settings.opacity_weight * _opacity(gaussians).mean() + settings.scale_weight * scales
     )

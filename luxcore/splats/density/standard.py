@@ -67,9 +67,9 @@ class StandardStrategy:
         s = self._statistics
         if s is None:
             s = self._statistics = _Statistics(*(self.device.zeros((n,)) for _ in range(3)))
-        self._kernel(
-            self.device.queue, (n,), None, gradients.mean2d_norm.data, out.radii.data,
-            gradients.visible.data, np.int32(n), s.norms.data, s.seen.data, s.radii.data,
+        self.device.launch(
+            self._kernel, n, gradients.mean2d_norm, out.radii, gradients.visible, n, s.norms,
+            s.seen, s.radii,
         )  # fmt: skip
 
     def refine(

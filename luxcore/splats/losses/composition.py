@@ -62,9 +62,9 @@ class CompositionLoss:
 
     def gradient(self, x: cla.Array, photo: cla.Array, params: cla.Array, d_x: cla.Array) -> None:
         """Add to `d_x` [h, w, 3M] and set `d_params`."""
-        self._kernel(
-            self.device.queue, (self._height,), (1,), x.data, photo.data, params.data,
-            self._units.data, np.float32(self._scale), d_x.data, self._partials.data,
+        self.device.launch(
+            self._kernel, self._height, x, photo, params, self._units, self._scale, d_x,
+            self._partials, group=1,
         )  # fmt: skip
         column_sums(self.device, self._partials, self._sums)
 

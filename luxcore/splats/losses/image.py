@@ -34,9 +34,10 @@ class ImageLoss:
         stride = 16 * blocks + 2 * pad
         defines = {
             "HEIGHT": height, "ROW": row, "CHANNELS": channels, "PAD": pad, "STRIDE": stride,
+            "BLOCKS": blocks,
         }  # fmt: skip
         self._kernels: Kernels = device.program("loss_image", defines)
-        self._grid = (blocks, height)
+        self._work_items = blocks * height
         self._l1_sums = device.zeros((height, blocks))
         self._ssim_sums = device.zeros((height, blocks))
         if ssim_weight:
@@ -45,20 +46,18 @@ class ImageLoss:
 
     def gradient(self, x: cla.Array, y: cla.Array, d_x: cla.Array) -> None:
         """Overwrite `d_x` with the gradient of the loss of `x` against the target `y`."""
-        queue, kernels = self.device.queue, self._kernels
-        l1_scale = np.float32(self.l1_weight / self.size)
+        launch, kernels, work_items = self.device.launch, self._kernels, self._work_items
+        l1_scale = self.l1_weight / self.size
         if not self.ssim_weight:
-            kernels.gradient_l1(
-                queue, self._grid, None, x.data, y.data, l1_scale, d_x.data, self._l1_sums.data
-            )
+            launch(kernels.gradient_l1, work_items, x, y, l1_scale, d_x, self._l1_sums)
             return
-        planes, partials = self._planes.data, self._partials.data
-        kernels.moments_columns(queue, self._grid, None, x.data, y.data, planes)
-        kernels.ssim_rows(queue, self._grid, None, planes, partials, self._ssim_sums.data)
-        kernels.partials_columns(queue, self._grid, None, partials, planes)
-        kernels.gradient_rows(
-            queue, self._grid, None, x.data, y.data, planes, l1_scale,
-            np.float32(-self.ssim_weight / self.size), d_x.data, self._l1_sums.data,
+        planes, partials = self._planes, self._partials
+        launch(kernels.moments_columns, work_items, x, y, planes)
+        launch(kernels.ssim_rows, work_items, planes, partials, self._ssim_sums)
+        launch(kernels.partials_columns, work_items, partials, planes)
+        launch(
+            kernels.gradient_rows, work_items, x, y, planes, l1_scale,
+            -self.ssim_weight / self.size, d_x, self._l1_sums,
         )  # fmt: skip
 
     def value(self) -> float:

@@ -59,10 +59,9 @@ class SmoothnessLoss:
 
     def add_gradient(self, lights: cla.Array, d_lights: cla.Array) -> None:
         """Add the gradient by `lights` [n, channels] to `d_lights`."""
-        self._kernel(
-            self.device.queue, (self.count,), None, lights.data, self._start.data,
-            self._other.data, np.int32(self.count), np.float32(self._scale), d_lights.data,
-            self._sums.data,
+        self.device.launch(
+            self._kernel, self.count, lights, self._start, self._other, self.count, self._scale,
+            d_lights, self._sums,
         )  # fmt: skip
 
     def value(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pyopencl.array as cla
 
 from luxcore.splats.device import Device
@@ -11,6 +10,4 @@ from luxcore.splats.device import Device
 def column_sums(device: Device, partials: cla.Array, sums: cla.Array) -> None:
     """`sums` [c] = Σ over rows of `partials` [r, c]."""
     rows, columns = partials.shape
-    device.program("reduce").sum_columns(
-        device.queue, (columns,), None, partials.data, np.int32(rows), np.int32(columns), sums.data
-    )
+    device.launch(device.program("reduce").sum_columns, columns, partials, rows, columns, sums)
