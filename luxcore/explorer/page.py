@@ -18,6 +18,7 @@ from luxcore.explorer.codes import SLOPE, encode, fit_webp, span_of
 from luxcore.files.atomic import atomic_file
 from luxcore.light import agx_glsl
 from luxcore.light.blackbody import blackbody_rgb
+from luxcore.light.levels import split_scale
 
 MAX_BYTES = 4_000_000
 """Size that a page should not exceed: it is sent by mail and opened on phones."""
@@ -25,8 +26,6 @@ MAX_SIDE = 1600
 """Longest side shown, in pixels; larger photos are averaged down in linear light."""
 PAGE_BYTES = 40_000
 """Room kept for the page itself, without pictures."""
-OFF_BELOW = 1e-4
-"""A lamp whose scale is below this share of the brightest counts as off in the photo."""
 KELVINS = tuple(round(1500 * (12000 / 1500) ** (i / 24)) for i in range(25))
 DAYLIGHT_K = 6500
 
@@ -34,9 +33,9 @@ DAYLIGHT_K = 6500
 def write_explorer(
     path: Path,
     photo_display: Float[np.ndarray, "h w 3"],
-    ambient_linear: Float[np.ndarray, "h w 3"],
-    olats_linear: Float[np.ndarray, "k h w 3"],
-    scale: Float[np.ndarray, "k 3"],
+    ambient_linear: Float[np.ndarray, "ha wa 3"],
+    olats_linear: Float[np.ndarray, "k ho wo 3"],
+    scale: Float[np.ndarray, "ks 3"],
     names: Sequence[str],
     exposure: float,
 ) -> Path:
@@ -48,36 +47,26 @@ def write_explorer(
     Returns `path`. Raises InputError when the sizes disagree or values are not finite.
     """
     _check(path, photo_display, ambient_linear, olats_linear, scale, names, exposure)
-    levels, colours, on = _levels(scale)
+    lamps = split_scale(scale)
     factor = _shrink_factor(photo_display.shape[:2])
     layers = [exposure * _shrink(ambient_linear, factor)]
     layers += [
-        exposure * level * _shrink(o, factor) for level, o in zip(levels, olats_linear, strict=True)
+        exposure * level * _shrink(olat, factor)
+        for level, olat in zip(lamps.level, olats_linear, strict=True)
     ]
     spans = [span_of(layer) for layer in layers]
     codes = [encode(layer, span) for layer, span in zip(layers, spans, strict=True)]
     photo = np.round(np.clip(_shrink(photo_display, factor), 0, 1) * 255).astype(np.uint8)
     files, quality = fit_webp([photo, *codes], (MAX_BYTES - PAGE_BYTES) * 3 // 4)
     rows = [_row("Ambient light", True, np.ones(3), spans[0], files[1])]
-    for name, lit, colour, span, file in zip(names, on, colours, spans[1:], files[2:], strict=True):
+    for name, lit, colour, span, file in zip(
+        names, lamps.on, lamps.colour, spans[1:], files[2:], strict=True
+    ):
         rows.append(_row(name, bool(lit), colour, span, file))
     scene = _scene(photo.shape, files[0], rows, photo_display.shape, quality)
     with atomic_file(Path(path)) as temporary:
         temporary.write_text(_page(scene), encoding="utf-8")
     return Path(path)
-
-
-def _levels(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Each lamp's level (largest channel), colour (largest channel 1), and whether it was on.
-
-    A lamp that was off gets the median level of the others, and white: a switch must do something.
-    """
-    levels = scale.max(axis=1) if len(scale) else np.zeros(0)
-    on = levels > OFF_BELOW * max(levels.max(initial=0.0), OFF_BELOW)
-    usual = float(np.median(levels[on])) if on.any() else 1.0
-    colours = np.ones_like(scale)
-    colours[on] = np.clip(scale[on] / levels[on, None], 0.0, 1.0)
-    return np.where(on, levels, usual), colours, on
 
 
 def _row(name: str, on: bool, colour: np.ndarray, span: float, file: bytes) -> dict[str, Any]:

@@ -100,7 +100,7 @@ def test_keyboard_switches_lamps_and_the_address_remembers(tab: Page, page_file:
     assert not tab.locator(".row").nth(1).locator("[role=switch]").is_checked()
     dark = downloaded(tab)
     assert srgb_decode(dark).mean() < 0.8 * srgb_decode(lit).mean()
-    tab.wait_for_function("location.hash.includes('l1=0,0,o')")
+    tab.wait_for_url("**l1=0,0,o")
     tab.reload()
     tab.wait_for_selector("#view:not([hidden])")
     assert np.array_equal(downloaded(tab), dark)

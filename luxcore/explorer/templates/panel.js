@@ -24,6 +24,8 @@ function buildRow(row, i) {
   const part = (selector) => element.querySelector(selector);
   part("legend").textContent = part(".name").textContent = row.name;
   part(".solo").setAttribute("aria-label", `Solo: only ${row.name}`);
+  part(".stops").setAttribute("aria-label", `${row.name}: intensity`);
+  part(".kelvin").setAttribute("aria-label", `${row.name}: colour temperature`);
   part(".rgb").setAttribute("aria-label", `${row.name}: any colour`);
   const change = (edit) => { edit(state.rows[i]); update(); };
   part("[role=switch]").onchange = (e) => change((s) => { s.on = e.target.checked; });
