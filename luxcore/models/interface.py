@@ -84,7 +84,10 @@ class Reference:
 class Decomposer(Protocol):
     """A single-view model (the paper's LuxRemix-SV)."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The backend's name, as in `luxcore.models.backends`."""
+        ...
 
     def decompose(
         self,
@@ -106,7 +109,10 @@ class Decomposer(Protocol):
 class Harmonizer(Protocol):
     """A multi-view model (the paper's LuxRemix-MV)."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The backend's name, as in `luxcore.models.backends`."""
+        ...
 
     def run_pass(
         self, views: Sequence[View], references: Sequence[Reference], seed: int

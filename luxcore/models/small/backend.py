@@ -1,0 +1,44 @@
+"""How `luxcore.models.backends` opens the small models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from luxcore.errors import InputError
+from luxcore.models.interface import BackendSettings, Decomposer, Harmonizer
+from luxcore.models.small.multi_view import SmallHarmonizer
+from luxcore.models.small.single_view import SmallDecomposer
+from luxcore.models.small.weights import load_network, shipped_weights
+
+LONG_SIDE_PX = 160
+"""Long side of the network's grid: the resolution it was trained at, plus some detail."""
+
+LONG_SIDE_RANGE = (32, 1024)
+
+
+def open_decomposer(settings: BackendSettings) -> Decomposer:
+    """`sv_weights` is a safetensors file (default: the shipped one); option `long_side_px`."""
+    net = load_network(_path(settings.sv_weights, "sv"), "sv")
+    return SmallDecomposer(net, _long_side(settings))
+
+
+def open_harmonizer(settings: BackendSettings) -> Harmonizer:
+    """`mv_weights` is a safetensors file (default: the shipped one); option `long_side_px`."""
+    net = load_network(_path(settings.mv_weights, "mv"), "mv")
+    return SmallHarmonizer(net, _long_side(settings))
+
+
+def _path(weights: str | None, kind: str) -> Path:
+    path = shipped_weights(kind) if weights is None else Path(weights)
+    return path / "model.safetensors" if path.is_dir() else path
+
+
+def _long_side(settings: BackendSettings) -> int:
+    unknown = sorted(set(settings.options) - {"long_side_px"})
+    if unknown:
+        raise InputError(f"the small backend has no option {unknown[0]}; it has long_side_px.")
+    value = settings.options.get("long_side_px", LONG_SIDE_PX)
+    low, high = LONG_SIDE_RANGE
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise InputError(f"long_side_px must be a whole number from {low} to {high}, got {value}.")
+    return value

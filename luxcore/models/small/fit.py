@@ -1,0 +1,152 @@
+"""The training loop: AdamW with warm-up and a linear end, EMA weights, exact resume."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from luxcore.errors import DivergedError
+from luxcore.files.atomic import atomic_file
+from luxcore.models.small.examples import Example
+from luxcore.models.small.heads import light_fields
+from luxcore.models.small.losses import example_loss
+from luxcore.models.small.network import LampNet, channels_last
+from luxcore.progress import progress
+
+
+class Batches(Protocol):
+    """Examples by step, with the features that the network reads; pure functions of the number."""
+
+    def batch(self, step: int) -> Sequence[tuple[Tensor, Example]]: ...
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """`steps` in all; the rate falls linearly to zero over the last `cooldown` share of them."""
+
+    steps: int
+    rate: float
+    warmup: int = 50
+    cooldown: float = 0.4
+    ema: float = 0.995
+    bf16: bool = True
+    check_every: int = 200
+
+
+@dataclass
+class FitResult:
+    """The averaged weights and the curve: one row per check."""
+
+    weights: dict[str, Tensor]
+    curve: list[dict[str, float]]
+
+
+def fit(
+    net: LampNet,
+    batches: Batches,
+    settings: FitSettings,
+    validate: Callable[[LampNet], float],
+    checkpoint: Path | None = None,
+) -> FitResult:
+    """Train `net` in place. With `checkpoint`, an interrupted call continues to the same bits."""
+    state = _Fit(net, settings, validate)
+    if checkpoint is not None and checkpoint.is_file():
+        state.load(torch.load(checkpoint, weights_only=True))
+    with progress("training", settings.steps, "steps") as bar:
+        bar.advance(state.step)
+        while state.step < settings.steps:
+            loss = state.advance(batches.batch(state.step))
+            bar.advance(loss=f"{loss:.4f}")
+            if state.step % settings.check_every == 0 or state.step == settings.steps:
+                state.check()
+                if checkpoint is not None:
+                    state.save(checkpoint)
+    return FitResult(state.ema, state.curve)
+
+
+class _Fit:
+    def __init__(
+        self, net: LampNet, settings: FitSettings, validate: Callable[[LampNet], float]
+    ) -> None:
+        self.net = channels_last(net).train()
+        self.settings, self.validate = settings, validate
+        self.optimizer = torch.optim.AdamW(net.parameters(), settings.rate, weight_decay=0.02)
+        self.ema = {k: v.detach().clone() for k, v in net.state_dict().items()}
+        self.step, self.lamps, self.loss = 0, 0, math.nan
+        self.curve: list[dict[str, float]] = []
+
+    def advance(self, batch: Sequence[tuple[Tensor, Example]]) -> float:
+        """One step on all lamps of a batch of photos."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.settings.rate * schedule(self.step, self.settings)
+        features = torch.cat([f for f, _ in batch]).contiguous(memory_format=torch.channels_last)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bf16):
+            outputs = self.net(features)
+        parts = outputs.float().split([len(f) for f, _ in batch])
+        losses = [
+            example_loss(light_fields(part, example.on), example)
+            for part, (_, example) in zip(parts, batch, strict=True)
+        ]
+        loss = torch.stack(losses).mean()
+        if not bool(torch.isfinite(loss)):
+            raise DivergedError(f"training diverged: the loss of step {self.step} is not finite.")
+        self.optimizer.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.net.parameters(), 1.0)
+        self.optimizer.step()
+        self._average()
+        self.step, self.lamps = self.step + 1, self.lamps + len(features)
+        self.loss = float(loss) if math.isnan(self.loss) else 0.98 * self.loss + 0.02 * float(loss)
+        return self.loss
+
+    def check(self) -> None:
+        """Score the averaged weights on photos that training never sees."""
+        shape, own = self.net.shape, self.net.training
+        averaged = channels_last(LampNet(shape))
+        averaged.load_state_dict(self.ema)
+        row = {
+            "step": self.step,
+            "lamps_seen": self.lamps,
+            "loss": self.loss,
+            "psnr_validation": self.validate(averaged.eval()),
+        }
+        self.curve.append(row)
+        self.net.train(own)
+
+    def save(self, path: Path) -> None:
+        """All that the next step depends on."""
+        state = {
+            "net": self.net.state_dict(),
+            "ema": self.ema,
+            "optimizer": self.optimizer.state_dict(),
+            "numbers": [self.step, self.lamps, self.loss],
+            "curve": self.curve,
+        }
+        with atomic_file(path) as temporary:
+            torch.save(state, temporary)
+
+    def load(self, state: dict[str, Any]) -> None:
+        """The inverse of `save`."""
+        self.net.load_state_dict(state["net"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.ema, self.curve = state["ema"], state["curve"]
+        step, lamps, self.loss = state["numbers"]
+        self.step, self.lamps = int(step), int(lamps)
+
+    def _average(self) -> None:
+        # Early averages would remember the initial weights; the ramp forgets them.
+        decay = min(self.settings.ema, (1 + self.step) / (10 + self.step))
+        for name, value in self.net.state_dict().items():
+            self.ema[name].lerp_(value, 1 - decay)
+
+
+def schedule(step: int, settings: FitSettings) -> float:
+    """Share of the full rate: warm-up, plateau, linear end."""
+    cooling = max(1.0, settings.cooldown * settings.steps)
+    return min(1.0, (step + 1) / settings.warmup, (settings.steps - step) / cooling)

@@ -1,0 +1,68 @@
+"""From the network's answers about K lamps to one decomposition that adds up exactly.
+
+The photo is split, not repainted: every lamp that is on, and the ambient rest, gets an RGB fraction
+of each pixel, and the fractions sum to 1 (softmax over lamps and ambient). So texture stays exact
+and OLATs, one-light-off pictures and all brackets agree. A lamp that is off has no fraction: its
+light is the photo times an unbounded ratio. Where the photo is clipped, a boost restores what
+the lamp sent beyond it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from luxcore.models.small.features import CLIPPED
+
+MAX_LOG_RATIO = 8.0
+"""Natural log of the largest ratio between a switched-off lamp's light and the photo."""
+
+MAX_LOG_BOOST = 6.0
+"""Natural log of the largest boost of a clipped emitter: 400 times white."""
+
+RATIO_FLOOR = 0.02
+"""Added to the photo before the ratio multiplies it: black pixels can be lit as well."""
+
+
+@dataclass(frozen=True)
+class LightFields:
+    """What the network says about one photo; everything but `photo` is smooth enough to upsample.
+
+    `fraction[0]` is ambient's, `fraction[1 + k]` lamp k's (0 when off); they sum to 1.
+    `log_ratio[k]` and `log_boost[k]` are natural logs.
+    """
+
+    fraction: Float[Tensor, "k1 3 h w"]
+    log_ratio: Float[Tensor, "k 3 h w"]
+    log_boost: Float[Tensor, "k 3 h w"]
+
+
+def light_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> LightFields:
+    """The heads of all lamps of one photo, brought together."""
+    lamp, ambient, ratio, boost = outputs.float().chunk(4, dim=1)
+    # Each lamp's pass has its own view of the ambient; the burning lamps' mean speaks for it.
+    ambient = (
+        ambient[on].mean(0, keepdim=True)
+        if bool(on.any())
+        else ambient.new_zeros(1, *ambient.shape[1:])
+    )
+    off = ~on.view(-1, 1, 1, 1)
+    logits = torch.cat([ambient, lamp.masked_fill(off, float("-inf"))])
+    return LightFields(
+        logits.softmax(dim=0),
+        ratio.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
+        MAX_LOG_BOOST * torch.sigmoid(boost - 2),
+    )
+
+
+def lamp_light(
+    fields: LightFields, photo: Float[Tensor, "3 h w"], on: Bool[Tensor, " k"]
+) -> Float[Tensor, "k 3 h w"]:
+    """Linear light of each lamp: what it gives when on, what it would give when off."""
+    clipped = (photo.amax(0) > CLIPPED).to(photo)
+    burning = fields.fraction[1:] * photo * torch.exp(fields.log_boost * clipped)
+    switched_on = (photo + RATIO_FLOOR) * torch.exp(fields.log_ratio)
+    return torch.where(on.view(-1, 1, 1, 1), burning, switched_on)

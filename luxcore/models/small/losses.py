@@ -1,0 +1,72 @@
+"""What the network is asked to get right: light as it is seen, at all exposures and both tasks."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from luxcore.models.small.examples import Example
+from luxcore.models.small.features import CLIPPED, display_curve
+from luxcore.models.small.heads import LightFields, lamp_light
+
+BRACKETS = ((1.0, 1.0), (0.25, 0.5), (0.0625, 0.25))
+"""(exposure, weight): EV0, EV-2, EV-4 of the paper's three brightness levels."""
+
+OFF_WEIGHT = 0.5
+"""Of lamps that are off in the photo, whose brightness nobody can know: they must not drown the
+lamps that are on."""
+
+
+def example_loss(fields: LightFields, example: Example) -> Tensor:
+    """Mean over lamps of the display-space error, for OLATs of lamps on and off; a scalar."""
+    light = lamp_light(fields, example.photo, example.on)
+    on = example.on
+    terms = []
+    if bool(on.any()):
+        terms.append(_seen_error(light[on], example.lights[on]))
+        terms.append(0.5 * _one_light_off_error(fields, example))
+        terms.append(0.2 * _fraction_error(fields, example))
+    if bool((~on).any()):
+        share = OFF_WEIGHT * float((~on).float().mean())
+        matched = _rescaled(light[~on], example.lights[~on])
+        terms.append(share * _seen_error(matched, example.lights[~on]))
+        terms.append(0.1 * share * _seen_error(light[~on], example.lights[~on]))
+    return torch.stack(terms).sum() if terms else fields.fraction.sum() * 0
+
+
+def _seen_error(predicted: Tensor, truth: Tensor) -> Tensor:
+    total = predicted.new_zeros(())
+    for exposure, weight in BRACKETS:
+        difference = display_curve(predicted * exposure) - display_curve(truth * exposure)
+        total = total + weight * _robust(difference)
+    return total
+
+
+def _robust(difference: Tensor) -> Tensor:
+    """Between squared (what PSNR counts) and absolute (sharp shadow edges): Charbonnier at 0.05."""
+    return torch.sqrt(difference**2 + 0.05**2).sub(0.05).mean()
+
+
+def _one_light_off_error(fields: LightFields, example: Example) -> Tensor:
+    """The paper's second task: the photo without each burning lamp, from the same fractions."""
+    fraction = fields.fraction[1:][example.on]
+    visible = (example.photo.amax(0) <= CLIPPED).to(example.photo)
+    rest = example.photo * (1 - fraction)
+    truth = (example.photo - example.lights[example.on]).clamp_min(0)
+    return _robust((display_curve(rest) - display_curve(truth)) * visible)
+
+
+def _fraction_error(fields: LightFields, example: Example) -> Tensor:
+    """Plain error of the fractions: dark places count as much as bright ones."""
+    total = example.ambient + example.lights[example.on].sum(0) + 1e-4
+    truth = torch.cat([example.ambient[None], example.lights[example.on]]) / total
+    keep = torch.cat([example.on.new_ones(1), example.on])
+    return (fields.fraction[keep] - truth).abs().mean()
+
+
+def _rescaled(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:
+    """Least-squares scale per lamp and channel on light that a display can show, then applied."""
+    p, t = predicted.clamp_max(4), truth.clamp_max(4)
+    scale = (p * t).sum((2, 3)) / (p * p).sum((2, 3)).clamp_min(1e-6)
+    return predicted * scale.clamp(0.01, 100)[..., None, None]

@@ -1,0 +1,107 @@
+"""A pixel-unshuffle U-Net that looks at one lamp of one photo and says how its light falls.
+
+The weights are shared by all lamps: K lamps are a batch of K. What the four heads mean, and how K
+answers become one decomposition that adds up, is in `heads.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+
+import torch
+import torch.nn.functional as fn
+from jaxtyping import Float
+from torch import Tensor, nn
+
+OUTPUTS = 12
+"""Four heads of RGB: lamp logit, ambient logit, log ratio of a lamp that is off, emitter boost."""
+
+
+@dataclass(frozen=True)
+class NetworkShape:
+    """What must be equal for weights to fit."""
+
+    inputs: int
+    widths: tuple[int, ...] = (48, 96, 192, 256)
+    unshuffle: int = 2
+    heads: int = 4
+
+    @property
+    def stride(self) -> int:
+        """Height and width of an input must be multiples of this."""
+        return self.unshuffle * 2 ** (len(self.widths) - 1)
+
+    def as_metadata(self) -> dict[str, object]:
+        """Plain values, for the header of a weights file."""
+        return {**asdict(self), "widths": list(self.widths)}
+
+
+class LampNet(nn.Module):
+    """[b, inputs, h, w] → [b, OUTPUTS, h, w]; h and w multiples of `shape.stride`."""
+
+    def __init__(self, shape: NetworkShape) -> None:
+        super().__init__()
+        self.shape = shape
+        widths, block = shape.widths, shape.unshuffle**2
+        self.stem = nn.Conv2d(shape.inputs * block, widths[0], 3, padding=1)
+        before = (widths[0], *widths[:-1])
+        self.down = nn.ModuleList(Residual(i, o) for i, o in zip(before, widths, strict=True))
+        self.middle = nn.Sequential(Attention(widths[-1], shape.heads), Residual(*widths[-1:] * 2))
+        pairs = list(pairwise(widths))[::-1]
+        self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
+        self.head = nn.Conv2d(widths[0], OUTPUTS * block, 3, padding=1)
+        # Zero logits are an even share of the light: a sane start for every lamp.
+        for parameter in self.head.parameters():
+            nn.init.zeros_(parameter)
+
+    def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o h w"]:
+        x = self.stem(fn.pixel_unshuffle(features, self.shape.unshuffle))
+        skips: list[Tensor] = []
+        for level, block in enumerate(self.down):
+            x = block(fn.avg_pool2d(x, 2) if level else x)
+            skips.append(x)
+        x = self.middle(x)
+        for block, skip in zip(self.up, skips[-2::-1], strict=True):
+            x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
+        return fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+
+
+class Residual(nn.Module):
+    """Two normalised 3×3 convolutions beside a skip."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.norm1, self.norm2 = nn.GroupNorm(8, inputs), nn.GroupNorm(8, outputs)
+        self.conv1 = nn.Conv2d(inputs, outputs, 3, padding=1)
+        self.conv2 = nn.Conv2d(outputs, outputs, 3, padding=1)
+        self.skip = nn.Identity() if inputs == outputs else nn.Conv2d(inputs, outputs, 1)
+        nn.init.zeros_(self.conv2.weight)
+
+    def forward(self, x: Float[Tensor, "b i h w"]) -> Float[Tensor, "b o h w"]:
+        hidden = self.conv1(fn.silu(self.norm1(x)))
+        return self.skip(x) + self.conv2(fn.silu(self.norm2(hidden)))
+
+
+class Attention(nn.Module):
+    """Every place of the coarsest grid sees every other: light crosses the whole room."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.norm = nn.GroupNorm(8, width)
+        self.qkv = nn.Conv2d(width, 3 * width, 1)
+        self.out = nn.Conv2d(width, width, 1)
+        nn.init.zeros_(self.out.weight)
+
+    def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
+        b, c, h, w = x.shape
+        tokens = self.qkv(self.norm(x)).reshape(b, 3, self.heads, c // self.heads, h * w)
+        q, k, v = tokens.transpose(-1, -2).unbind(1)
+        mixed = fn.scaled_dot_product_attention(q, k, v)
+        return x + self.out(mixed.transpose(-1, -2).reshape(b, c, h, w))
+
+
+def channels_last(net: LampNet) -> LampNet:
+    """The same weights laid out as the CPU's convolutions like them: twice as fast."""
+    return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

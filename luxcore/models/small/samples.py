@@ -1,0 +1,54 @@
+"""Photos whose light is known, relit anew each time they are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.random import Generator
+
+from luxcore.data.crops import LitCrop
+from luxcore.data.lighting import draw_relighting, exposed
+
+
+class GroupSource(Protocol):
+    """Overlapping photos of one room by number, as `luxcore.data.multiview.MultiViewSets` gives."""
+
+    def crops(self, index: int, views: int) -> list[LitCrop]: ...
+
+
+@dataclass(frozen=True)
+class CropPool:
+    """Groups of overlapping photos kept in memory: cutting and sketching them is paid for once."""
+
+    groups: tuple[tuple[LitCrop, ...], ...]
+
+    @staticmethod
+    def collect(source: GroupSource, groups: Sequence[int], views: int) -> CropPool:
+        """The groups of `source` with these numbers, `views` photos each."""
+        return CropPool(tuple(tuple(source.crops(index, views)) for index in groups))
+
+    def __add__(self, other: CropPool) -> CropPool:
+        return CropPool(self.groups + other.groups)
+
+    def __len__(self) -> int:
+        return len(self.groups)
+
+    def photos(self) -> Iterator[LitCrop]:
+        """Every photo of every group."""
+        return (crop for group in self.groups for crop in group)
+
+    def relit(self, rng: Generator, views: int | None = None) -> list[LitCrop]:
+        """A random group in random order under new light (`views` of it, or all)."""
+        group = self.groups[int(rng.integers(len(self.groups)))]
+        order = rng.permutation(len(group))[:views]
+        light = draw_relighting(rng, len(group[0].on))
+        return exposed([light.apply(group[int(i)]) for i in order], rng)
+
+
+def chw(image: np.ndarray) -> torch.Tensor:
+    """[..., h, w, c] numpy to [..., c, h, w] float32 tensor."""
+    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(image, -1, -3), dtype=np.float32))

@@ -1,0 +1,31 @@
+"""The score that training watches: the paper's metric on a few photos kept aside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from luxcore.light.agx import agx
+from luxcore.models.small.examples import Example
+from luxcore.models.small.heads import lamp_light, light_fields
+from luxcore.models.small.network import LampNet
+
+
+def mean_psnr(net: LampNet, cases: Sequence[tuple[Tensor, Example]]) -> float:
+    """Mean PSNR in dB of burning lamps' OLATs, AgX after a least-squares scale per channel."""
+    scores: list[Tensor] = []
+    with torch.no_grad():
+        for features, example in cases:
+            fields = light_fields(net(features), example.on)
+            light = lamp_light(fields, example.photo, example.on)[example.on]
+            scores += [_psnr(p, t) for p, t in zip(light, example.lights[example.on], strict=True)]
+    return float(torch.stack(scores).mean()) if scores else float("nan")
+
+
+def _psnr(predicted: Tensor, truth: Tensor) -> Tensor:
+    scale = (predicted * truth).sum((1, 2)) / (predicted**2).sum((1, 2)).clamp_min(1e-9)
+    shown = agx((predicted * scale[:, None, None]).movedim(0, -1))
+    error = (shown - agx(truth.movedim(0, -1))) ** 2
+    return -10 * torch.log10(error.mean().clamp_min(1e-8))

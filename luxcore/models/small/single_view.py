@@ -1,0 +1,88 @@
+"""The small single-view model behind the project's `Decomposer` interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from luxcore.models.interface import Decomposition, Geometry
+from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
+from luxcore.models.small.features import lamp_features
+from luxcore.models.small.grid import (
+    fields_at_full_size,
+    geometry_to_grid,
+    grid_size,
+    masks_to_grid,
+    photo_to_grid,
+)
+from luxcore.models.small.heads import LightFields, lamp_light, light_fields
+from luxcore.models.small.network import LampNet
+from luxcore.models.small.samples import chw
+
+
+@dataclass(frozen=True)
+class SmallDecomposer:
+    """Light fractions at `long_side_px`, carried to the photo's own size. Deterministic."""
+
+    net: LampNet
+    long_side_px: int
+    name: str = "small"
+
+    def decompose(
+        self,
+        image_linear: Float[np.ndarray, "h w 3"],
+        masks: Bool[np.ndarray, "k h w"],
+        on: Bool[np.ndarray, " k"],
+        geometry: Geometry | None,
+        seed: int,
+    ) -> Decomposition:
+        """See `luxcore.models.interface.Decomposer`; `seed` changes nothing here."""
+        height, width = image_linear.shape[:2]
+        size = grid_size(height, width, self.long_side_px, self.net.shape.stride)
+        small = photo_to_grid(image_linear, size)
+        burning = torch.from_numpy(on)
+        features = lamp_features(
+            small, masks_to_grid(masks, size), burning, geometry_to_grid(geometry, size)
+        )
+        fields = run_network(self.net, features, burning)
+        return finish(fields, small, image_linear, masks, burning)
+
+
+def run_network(
+    net: LampNet, features: Float[Tensor, "k c y x"], on: Bool[Tensor, " k"]
+) -> LightFields:
+    """The light fields of one photo on the grid; K = 0 needs no network."""
+    if not len(features):
+        return light_fields(features.new_zeros(0, 12, *features.shape[-2:]), on)
+    with torch.inference_mode():
+        outputs = net(features.contiguous(memory_format=torch.channels_last))
+    return light_fields(outputs.clone(), on)
+
+
+def finish(
+    fields: LightFields,
+    photo_small: Float[Tensor, "3 y x"],
+    image_linear: Float[np.ndarray, "h w 3"],
+    masks: Bool[np.ndarray, "k h w"],
+    on: Bool[Tensor, " k"],
+) -> Decomposition:
+    """Light fields and the full photo to a decomposition that adds up.
+
+    Emitters of lamps that are on keep foreign light out; where a lamp that is off will glow, its
+    own light stays. Scales are 1 for lamps that are on: `olat` is then the lamp's share itself.
+    """
+    photo = chw(image_linear).clamp_min(0)
+    fields = fields_at_full_size(fields, photo_small, photo)
+    lights, ambient = lamp_light(fields, photo, on), fields.fraction[0] * photo
+    covered = torch.from_numpy(masks)
+    lights, ambient = keep_out_of_emitters(lights, ambient, emitter_masks(photo, covered), on)
+    scale = on.float()[:, None].expand(-1, 3)
+    return Decomposition(_hwc(ambient), _hwc(lights), scale.numpy().copy())
+
+
+def _hwc(image: Tensor) -> np.ndarray:
+    return np.ascontiguousarray(image.movedim(-3, -1).numpy())

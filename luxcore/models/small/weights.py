@@ -1,0 +1,92 @@
+"""Weights on disk: safetensors in half precision, checked before anything is built from them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from luxcore.errors import FormatError, InputError
+from luxcore.files.atomic import atomic_file
+from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
+from luxcore.models.small.network import LampNet, NetworkShape, channels_last
+
+FORMAT = "lux-small-1"
+CHANNELS = {"sv": SV_CHANNELS, "mv": MV_CHANNELS}
+SHIPPED = Path(__file__).parents[1] / "weights"
+"""`sv.safetensors` and `mv.safetensors`, trained by the recipe in docs/models.md."""
+
+MAX_BYTES = 200_000_000
+
+
+def shipped_weights(kind: str) -> Path:
+    """Where the project's own weights are."""
+    return SHIPPED / f"{kind}.safetensors"
+
+
+def save_weights(path: Path, kind: str, shape: NetworkShape, weights: Mapping[str, Tensor]) -> None:
+    """Write `weights` of a network of `shape` as half precision. `kind`: "sv" or "mv"."""
+    from safetensors.torch import save_file
+
+    metadata = {"format": FORMAT, "kind": kind, "shape": json.dumps(shape.as_metadata())}
+    tensors = {name: t.detach().half().contiguous() for name, t in weights.items()}
+    with atomic_file(Path(path)) as temporary:
+        save_file(tensors, str(temporary), metadata)
+
+
+def load_network(path: Path, kind: str) -> LampNet:
+    """The network of a weights file, ready to run.
+
+    Raises InputError (missing) or FormatError: not safetensors (pickles are never opened), of
+    another model, of another shape, or holding values that are not finite.
+    """
+    path = Path(path)
+    metadata, tensors = _read(path)
+    if metadata.get("format") != FORMAT or metadata.get("kind") != kind:
+        raise FormatError(f"{path} holds no weights of the small {kind} model.")
+    try:
+        fields = json.loads(metadata["shape"])
+        shape = NetworkShape(**{**fields, "widths": tuple(fields["widths"])})
+        net = LampNet(shape)
+    except (KeyError, TypeError, ValueError, RuntimeError, ZeroDivisionError) as error:
+        raise FormatError(f"{path} describes no usable network: {error}.") from error
+    if shape.inputs != CHANNELS[kind]:
+        raise FormatError(
+            f"{path} was trained on {shape.inputs} input channels, this version has "
+            f"{CHANNELS[kind]}."
+        )
+    _check_tensors(path, tensors, net)
+    net.load_state_dict({name: tensor.float() for name, tensor in tensors.items()})
+    return channels_last(net).eval()
+
+
+def _read(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
+    from safetensors import SafetensorError, safe_open
+
+    if not path.is_file():
+        raise InputError(f"{path} does not exist.")
+    if path.stat().st_size > MAX_BYTES:
+        raise FormatError(f"{path} is larger than {MAX_BYTES} bytes, too large for these weights.")
+    try:
+        with safe_open(path, "pt") as file:
+            names: list[Any] = list(file.keys())
+            return file.metadata() or {}, {name: file.get_tensor(name) for name in names}
+    except (SafetensorError, OSError, ValueError) as error:
+        raise FormatError(f"{path} is not a safetensors file: {error}.") from error
+
+
+def _check_tensors(path: Path, tensors: Mapping[str, Tensor], net: LampNet) -> None:
+    expected = net.state_dict()
+    strange = sorted(set(tensors) ^ set(expected))
+    if strange:
+        raise FormatError(f"{path} lacks or has too much of {strange[0]} ({len(strange)} in all).")
+    for name, tensor in tensors.items():
+        if tensor.shape != expected[name].shape:
+            wanted = tuple(expected[name].shape)
+            raise FormatError(f"{path}: {name} is {tuple(tensor.shape)}, expected {wanted}.")
+        if not bool(torch.isfinite(tensor).all()):
+            raise FormatError(f"{path}: {name} has values that are not finite.")
