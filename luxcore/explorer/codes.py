@@ -14,8 +14,10 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 SLOPE = 256.0
-QUALITIES = (97, 94, 90, 86, 80, 72, 62, 50, 35, 20)
-"""WebP qualities to try, best first, until a page fits."""
+LOSSLESS = 101
+QUALITIES = (LOSSLESS, 97, 94, 90, 86, 80, 72, 62, 50, 35, 20)
+"""WebP qualities to try, best first, until a page fits. Without loss a relit picture is within
+0.3 steps of 255 on average, at quality 97 within 1.4 (two lamps of a real photo, 512²)."""
 
 
 def span_of(radiance: Float[np.ndarray, "h w 3"]) -> float:
@@ -36,18 +38,26 @@ def decode(codes: UInt8[np.ndarray, "h w 3"], span: float) -> Float[np.ndarray, 
 
 
 def webp(pixels: UInt8[np.ndarray, "h w 3"], quality: int) -> bytes:
-    """Lossy WebP: every browser with WebGL 2 decodes it, at about 1 bit a pixel."""
+    """WebP, which every browser with WebGL 2 decodes; LOSSLESS or a quality of 0..100."""
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "WEBP", quality=quality, method=4)
+    # Method 0 without loss takes a third of the time of method 4 and is 15 % larger.
+    options = {"lossless": True, "method": 0} if quality == LOSSLESS else {"quality": quality}
+    Image.fromarray(pixels).save(stream, "WEBP", **options)
     return stream.getvalue()
 
 
-def fit_webp(pictures: list[np.ndarray], budget_bytes: int) -> tuple[list[bytes], int]:
-    """All pictures as WebP within `budget_bytes` together, and the quality that was needed."""
+def fit_webp(
+    photo: np.ndarray, layers: list[np.ndarray], budget_bytes: int
+) -> tuple[bytes, list[bytes], int]:
+    """The photo and the coded layers as WebP within `budget_bytes`, and the layers' quality.
+
+    The photo is only shown, never multiplied, so it is always compressed with loss.
+    """
     for quality in QUALITIES:
-        files = [webp(picture, quality) for picture in pictures]
-        if sum(map(len, files)) <= budget_bytes:
+        shown = webp(photo, min(quality, QUALITIES[1]))
+        files = [webp(layer, quality) for layer in layers]
+        if len(shown) + sum(map(len, files)) <= budget_bytes:
             break
-    return files, quality
+    return shown, files, quality

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from luxcore.errors import InputError
-from luxcore.explorer.codes import SLOPE, encode, fit_webp, span_of
+from luxcore.explorer.codes import LOSSLESS, SLOPE, encode, fit_webp, span_of
 from luxcore.files.atomic import atomic_file
 from luxcore.light import agx_glsl
 from luxcore.light.blackbody import blackbody_rgb
@@ -57,13 +57,13 @@ def write_explorer(
     spans = [span_of(layer) for layer in layers]
     codes = [encode(layer, span) for layer, span in zip(layers, spans, strict=True)]
     photo = np.round(np.clip(_shrink(photo_display, factor), 0, 1) * 255).astype(np.uint8)
-    files, quality = fit_webp([photo, *codes], (MAX_BYTES - PAGE_BYTES) * 3 // 4)
-    rows = [_row("Ambient light", True, np.ones(3), spans[0], files[1])]
+    shown, files, quality = fit_webp(photo, codes, (MAX_BYTES - PAGE_BYTES) * 3 // 4)
+    rows = [_row("Ambient light", True, np.ones(3), spans[0], files[0])]
     for name, lit, colour, span, file in zip(
-        names, lamps.on, lamps.colour, spans[1:], files[2:], strict=True
+        names, lamps.on, lamps.colour, spans[1:], files[1:], strict=True
     ):
         rows.append(_row(name, bool(lit), colour, span, file))
-    scene = _scene(photo.shape, files[0], rows, photo_display.shape, quality)
+    scene = _scene(photo.shape, shown, rows, photo_display.shape, quality)
     with atomic_file(Path(path)) as temporary:
         temporary.write_text(_page(scene), encoding="utf-8")
     return Path(path)
@@ -87,6 +87,7 @@ def _scene(
     shown = f"{width} × {height} pixels"
     if full[:2] != shape[:2]:
         shown += f", averaged down from {full[1]} × {full[0]}"
+    stored = "lossless WebP" if quality == LOSSLESS else f"WebP, quality {quality}"
     return {
         "width": width,
         "height": height,
@@ -97,7 +98,7 @@ def _scene(
             "colours": [[round(float(c), 5) for c in _temperature_rgb(k)] for k in KELVINS],
         },
         "note": f"{shown}. Light is mixed in linear HDR and tone-mapped with AgX on this device; "
-        f"layers are stored as 8-bit logarithmic codes (WebP quality {quality}).",
+        f"layers are stored as 8-bit logarithmic codes ({stored}).",
     }
 
 

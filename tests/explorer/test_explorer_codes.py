@@ -1,9 +1,12 @@
 """Logarithmic codes: precision where the eye sees it, nothing lost at the ends."""
 
+import io
+
 import numpy as np
 import pytest
+from PIL import Image
 
-from luxcore.explorer.codes import SLOPE, decode, encode, fit_webp, span_of
+from luxcore.explorer.codes import LOSSLESS, SLOPE, decode, encode, fit_webp, span_of
 
 
 @pytest.mark.parametrize("peak", [4e-3, 1.0, 60.0, 5e4])
@@ -26,7 +29,9 @@ def test_black_and_negative_light_is_black() -> None:
 
 def test_quality_falls_until_the_budget_holds() -> None:
     noise = np.random.Generator(np.random.PCG64(1)).integers(0, 256, (64, 64, 3)).astype(np.uint8)
-    large, best = fit_webp([noise], 1_000_000)
-    small, quality = fit_webp([noise], len(large[0]) // 2)
+    _, (exact,), best = fit_webp(noise, [noise], 1_000_000)
+    assert best == LOSSLESS
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(exact))), noise)
+    shown, files, quality = fit_webp(noise, [noise], len(exact) // 2)
     assert quality < best
-    assert len(small[0]) <= len(large[0]) // 2
+    assert len(shown) + len(files[0]) <= len(exact) // 2
