@@ -6,7 +6,7 @@ READY := .venv/.ready
 
 setup: $(READY)
 
-$(READY): requirements.txt pyproject.toml .ci/setup
+$(READY): requirements.txt requirements-nodeps.txt pyproject.toml .ci/setup
 	sh .ci/setup
 
 run: $(READY)

@@ -1,0 +1,59 @@
+"""The command line: help costs no heavy import, and every mistake is one sentence."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from luxcore.cli import COMMANDS
+
+HEAVY = {"torch", "bpy", "pycolmap", "pyopencl", "cv2", "matplotlib", "viser", "diffusers"}
+HEAVY |= {"skimage", "scipy", "prefect", "dvc", "mlflow", "OpenEXR", "transformers"}
+
+
+def run_lux(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from luxcore.cli import main; main()", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
+
+
+def test_help_of_every_command_imports_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from luxcore.cli import COMMANDS, app\n"
+        "for name in [None, *COMMANDS]:\n"
+        "    arguments = ['--help'] if name is None else [name, '--help']\n"
+        "    app.main(arguments, standalone_mode=False)\n"
+        f"print('heavy:', sorted({HEAVY!r} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "heavy: []"
+
+
+def test_help_names_every_command():
+    listed = run_lux("--help").stdout
+    assert all(f"  {name} " in listed for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fact"),
+    [
+        (["nope"], "nope"),
+        (["run", "rendr"], "did you mean render?"),
+        (["schedule"], "--cron"),
+        (["remix", "no-such-folder", "--out", "x"], "no-such-folder"),
+    ],
+)
+def test_a_mistake_is_one_sentence_with_code_2(project_root, arguments, fact):
+    done = run_lux(*arguments, cwd=project_root)
+    assert done.returncode == 2
+    assert fact in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_outside_a_project_says_so(tmp_path):
+    done = run_lux("plan", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no dvc.yaml" in done.stderr
