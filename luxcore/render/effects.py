@@ -70,9 +70,7 @@ def analyse_effects(room: Room) -> Effects:
         transmission=Effect(
             glass, "glass objects" if glass else "no refracting glass", 8 if glass else 0
         ),
-        transparent=Effect(
-            "pane" in kinds, "thin panes" if "pane" in kinds else "no panes", 8
-        ),
+        transparent=Effect("pane" in kinds, "thin panes" if "pane" in kinds else "no panes", 8),
         caustics=Effect(
             glass or mirror or polished,
             "glass, mirrors or polished metal pass light on"

@@ -9,7 +9,7 @@ import numpy as np
 from luxcore.rooms.dice import Rng
 from luxcore.rooms.shapes import Vec3
 
-TEMPERATURE_K = (2500.0, 6500.0)
+TEMPERATURE_K = (2700.0, 6500.0)
 """Range of lamps: warm filament bulbs to daylight tubes."""
 
 HSV_JITTER = 0.1

@@ -56,7 +56,7 @@ def generate_room(seed: int, settings: RoomsSettings) -> Room:
 def _decorate(rng: Rng, layout: Layout, palette: Palette, fittings: Fittings) -> list[Part]:
     parts: list[Part] = []
     parts += _rugs(rng, layout, palette)
-    for _ in range(int(rng.integers(1, 6))):
+    for _ in range(int(rng.integers(3, 9))):
         width, height = between(rng, 0.3, 1.1), between(rng, 0.35, 0.9)
         z = between(rng, 1.4, 1.65)
         found = layout.on_wall(rng, width, z - height / 2, z + height / 2)
@@ -108,5 +108,3 @@ def environment_names(settings: RoomsSettings) -> tuple[str, ...]:
     if not files:
         raise InputError(f"{folder} holds no .exr or .hdr environment.")
     return tuple(files)
-
-

@@ -40,7 +40,7 @@ class Fittings:
         index = len(self.lamps)
         low, high = POWER_W[kind]
         # Skewed to warm white: most homes are between 2700 and 3500 K.
-        share = float(rng.beta(1.5, 2.6))
+        share = float(rng.beta(1.5, 2.2))
         temperature = round(TEMPERATURE_K[0] + share * (TEMPERATURE_K[1] - TEMPERATURE_K[0]), 1)
         power = round(low * (high / low) ** float(rng.random()), 3)
         center = _middle(piece, at, yaw_deg)

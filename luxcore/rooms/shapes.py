@@ -97,8 +97,10 @@ class Ellipsoid:
         rings = self.segments // 2
         thetas = np.linspace(-math.pi / 2, math.pi / 2, rings + 1)
         profile = tuple(
-            (float(_power(math.cos(t), self.squareness)) if 0 < k < rings else 0.0,
-             float(_power(math.sin(t), self.squareness)))
+            (
+                float(_power(math.cos(t), self.squareness)) if 0 < k < rings else 0.0,
+                float(_power(math.sin(t), self.squareness)),
+            )
             for k, t in enumerate(thetas)
         )
         mesh = Lathe(profile, self.segments).mesh()

@@ -53,12 +53,12 @@ def build_shell(rng: Rng, plan: FloorPlan, palette: Palette) -> Shell:
         material = "wall_feature" if number == feature else "wall"
         parts += _wall(wall, plan, mine, material)
         for hole in mine:
-            parts += _window(rng, wall, hole, palette, glazed) if hole.kind == "window" else (
-                _door(rng, wall, hole, palette)
+            parts += (
+                _window(rng, wall, hole, palette, glazed)
+                if hole.kind == "window"
+                else (_door(rng, wall, hole, palette))
             )
-    openings = tuple(
-        _opening(plan.walls[h.wall], h, glazed) for h in holes if h.kind == "window"
-    )
+    openings = tuple(_opening(plan.walls[h.wall], h, glazed) for h in holes if h.kind == "window")
     return Shell(tuple(parts), openings, holes)
 
 

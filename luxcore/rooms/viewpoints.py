@@ -44,7 +44,10 @@ def _is_free(
     around = Rect(x, y, x, y).grown(0.45 * shrink)
     if not layout.plan.holds(around) or z > layout.plan.ceiling_at(y) - 0.3:
         return False
-    # Low furniture may be below the camera, tall furniture may not be near it.
+    # A photographer stands on the floor; low furniture may be near, tall furniture may not.
+    feet = Rect(x, y, x, y).grown(0.25 * shrink)
+    if any(feet.overlap(p.rect) > 0 for p in layout.placed):
+        return False
     near = (p for p in layout.placed if around.overlap(p.rect) > 0)
     if any(p.piece.height > z - 0.35 for p in near):
         return False

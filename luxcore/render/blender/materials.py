@@ -61,7 +61,7 @@ def _shade(color: Vec3, factor: float) -> Vec3:
 def _paint(graph: Graph, m: Material) -> Any:
     vector = graph.coordinates((1.0, 1.0, 1.0), _offset(m))
     stains = _noise(graph, vector, 3.0, 2.0)
-    color = graph.ramp(stains, (0.3, _shade(m.color, 0.9)), (0.7, _shade(m.color, 1.04)))
+    color = graph.ramp(stains, (0.3, _shade(m.color, 0.97)), (0.7, _shade(m.color, 1.02)))
     return graph.matt(color)
 
 
@@ -144,9 +144,7 @@ def _fabric(graph: Graph, m: Material) -> Any:
 
 def _wood(graph: Graph, m: Material) -> Any:
     stretch = (0.8, 0.07, 0.07) if m.seed % 2 else (0.07, 0.07, 0.8)
-    return graph.principled(
-        _grain(graph, m, graph.coordinates(stretch, _offset(m))), m.roughness
-    )
+    return graph.principled(_grain(graph, m, graph.coordinates(stretch, _offset(m))), m.roughness)
 
 
 def _metal(graph: Graph, m: Material) -> Any:

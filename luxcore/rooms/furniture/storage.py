@@ -147,7 +147,9 @@ def kitchen_run(rng: Rng, palette: Palette, width: float) -> Piece:
             x, y, z = p.position
             parts.append(part(p.name, p.shape, p.material, (x, y - 0.13, round(z + 1.4, 4)),
                               p.rotation_deg))  # fmt: skip
-    return Piece("kitchen", tuple(parts), width, 0.64, 2.0, (Top((0, 0.05), width * 0.3, 0.4, 0.9),))
+    return Piece(
+        "kitchen", tuple(parts), width, 0.64, 2.0, (Top((0, 0.05), width * 0.3, 0.4, 0.9),)
+    )
 
 
 def plant(rng: Rng, palette: Palette) -> Piece:
