@@ -89,9 +89,6 @@ class NoiseSettings(Settings):
 class DataSettings(Settings):
     """Where training examples come from and how they are framed."""
 
-    source: Literal["rendered", "sketch"] = "rendered"
-    """`sketch` draws simple rooms as it goes: to try a training out without data."""
-
     root: str = ""
     """Folder of rendered rooms, in the compact form or in the public layout."""
 

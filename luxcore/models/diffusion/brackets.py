@@ -9,9 +9,6 @@ from jaxtyping import Float
 
 from luxcore.light.agx import agx
 
-BRACKETS_EV = (0.0, -2.0, -4.0)
-"""Exposures of the prompts "high", "medium" and "low" (paper, section 3.2)."""
-
 LIT_PERCENTILE = 90.0
 LIT_RADIANCE = 0.7
 """At EV 0 nine tenths of an OLAT lie below this radiance: the lit part of the room is well

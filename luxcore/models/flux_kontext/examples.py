@@ -2,79 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from numpy.random import Generator
 from torch import Tensor
 
-from luxcore.errors import InputError
+from luxcore.data.crops import LitCrop
+from luxcore.data.lighting import one_light_off
 from luxcore.light.agx import agx
 from luxcore.models.diffusion.brackets import olat_exposure, olat_picture
+from luxcore.models.diffusion.frames import to_tensor
 from luxcore.models.diffusion.randomness import numpy_generator
-from luxcore.models.diffusion.rooms import KindedView
+from luxcore.models.diffusion.rooms import LitPhotos, photo_with_lamp
 from luxcore.models.diffusion.schedule import ExampleKey
 from luxcore.models.flux_kontext.prompts import (
     Brightness,
-    LightKind,
     LightOffPrompt,
     OlatPrompt,
     Prompt,
     all_prompts,
     kind_named,
 )
-from luxcore.models.small.examples import recompose
-from luxcore.models.small.samples import LitGroups, LitView, chw
 from luxcore.settings.paper_models import DataSettings
 
-ATTEMPTS = 100
-"""Photos drawn until one shows a lamp."""
+TASK_STREAM = 2
+"""Keeps the drawing of an example's task apart from its noise."""
 
 
 @dataclass(frozen=True)
 class EditExamples:
-    """Newly lit photos of `groups` with one of the two tasks (paper, supplement, "On-the-fly
-    sampling"): photo to OLAT at a brightness, or photo to photo with the lamp off."""
+    """Newly lit photos with one of the two tasks (paper, supplement, "On-the-fly sampling"):
+    photo to OLAT at a brightness, or photo to photo with the lamp off."""
 
-    groups: LitGroups
+    photos: LitPhotos
     settings: DataSettings
     seed: int
 
     def __getitem__(self, key: ExampleKey) -> dict[str, Tensor]:
         """`photo` and `target` [3, h, w] display, `mask` [1, h, w], `prompt` its index."""
-        rng = numpy_generator(self.seed, key.position)
-        view, lamp = self._view_with_lamp(rng)
-        prompt, target = self._task(view, lamp, rng)
+        crop = photo_with_lamp(self.photos, key.position)
+        rng = numpy_generator(self.seed, key.position, TASK_STREAM)
+        prompt, target = self._task(crop, rng)
+        photo = agx(crop.image_linear * np.float32(crop.exposure))
+        size = (photo.shape[0], photo.shape[1])
         return {
-            "photo": chw(agx(view.image_linear)),
-            "target": chw(target),
-            "mask": torch.from_numpy(view.masks[lamp].astype(np.float32))[None],
+            "photo": to_tensor(photo, size)[0],
+            "target": to_tensor(target, size)[0],
+            "mask": torch.from_numpy(crop.masks[0].astype(np.float32))[None],
             "prompt": torch.tensor(all_prompts().index(prompt)),
         }
 
-    def _view_with_lamp(self, rng: Generator) -> tuple[LitView, int]:
-        for _ in range(ATTEMPTS):
-            view = recompose(self.groups.group(int(rng.integers(2**31)), 1), rng)[0]
-            shown = np.flatnonzero(view.masks.any((1, 2)))
-            if len(shown):
-                return view, int(rng.choice(shown))
-        raise InputError(f"none of {ATTEMPTS} training photos shows a lamp.")
-
-    def _task(self, view: LitView, lamp: int, rng: Generator) -> tuple[Prompt, np.ndarray]:
-        named = isinstance(view, KindedView)
-        kind = kind_named(view.kinds[lamp]) if named else LightKind.LIGHT
+    def _task(self, crop: LitCrop, rng: Generator) -> tuple[Prompt, Float[np.ndarray, "h w 3"]]:
+        kind = kind_named(crop.kinds[0])
         wants_off = rng.random() < self.settings.one_light_off_ratio
-        brightness = Brightness(rng.choice(list(Brightness)))
-        light = view.lights[lamp]
-        if wants_off and view.on[lamp]:
-            return LightOffPrompt(kind), agx(view.image_linear - light)
+        brightness = list(Brightness)[rng.integers(len(Brightness))]
+        if wants_off and crop.on[0]:
+            return LightOffPrompt(kind), agx(one_light_off(crop, 0) * np.float32(crop.exposure))
+        light = crop.lights[0]
         picture = olat_picture(light, olat_exposure([light]), brightness.exposure_ev)
         return OlatPrompt(kind, brightness), picture
 
 
-def prompts_of(examples: Sequence[dict[str, Tensor]]) -> list[Prompt]:
+def prompts_of(examples: Sequence[Mapping[str, Tensor]]) -> list[Prompt]:
     """The instructions of a batch."""
     known = all_prompts()
     return [known[int(example["prompt"])] for example in examples]

@@ -11,7 +11,7 @@ from luxcore.models.diffusion.command import train_command
 from luxcore.models.diffusion.events import Listener
 from luxcore.models.diffusion.loop import train
 from luxcore.models.diffusion.options import training_digest
-from luxcore.models.diffusion.rooms import open_groups
+from luxcore.models.diffusion.rooms import open_photos
 from luxcore.models.flux_kontext.editor import encode_prompts, load_editor
 from luxcore.models.flux_kontext.embeddings import cached_embeddings
 from luxcore.models.flux_kontext.examples import EditExamples
@@ -34,7 +34,7 @@ def train_kontext(settings: KontextTraining, out: Path, listener: Listener) -> P
     editor = load_editor(settings.model, FROZEN_DTYPE[settings.loop.mixed_precision], seed)
     if settings.loop.gradient_checkpointing:
         editor.module.enable_gradient_checkpointing()
-    examples = EditExamples(open_groups(settings.data), settings.data, seed)
+    examples = EditExamples(open_photos(settings.data, seed), settings.data, seed)
     trainee = KontextTrainee(editor, embeddings, examples, settings)
     return train(trainee, settings.phases, settings.loop, out, training_digest(settings), listener)
 

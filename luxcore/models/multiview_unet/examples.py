@@ -6,23 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy.random import Generator
 from torch import Tensor
 from torch.nn import functional
 
-from luxcore.errors import InputError
+from luxcore.data.crops import LitCrop
+from luxcore.data.lighting import BRACKETS_EV, one_light_off
 from luxcore.light.agx import agx
-from luxcore.models.diffusion.brackets import BRACKETS_EV, olat_exposure, olat_picture
+from luxcore.models.diffusion.brackets import olat_exposure, olat_picture
+from luxcore.models.diffusion.frames import to_tensor
 from luxcore.models.diffusion.randomness import numpy_generator
+from luxcore.models.diffusion.rooms import LitSets, set_with_lamp
 from luxcore.models.diffusion.schedule import ExampleKey
 from luxcore.models.multiview_unet.rays import plucker_rays
-from luxcore.models.small.examples import recompose
-from luxcore.models.small.samples import LitGroups, LitView, chw
 from luxcore.settings.paper_models import DataSettings, MultiViewSettings
 
-ATTEMPTS = 100
-"""Groups drawn until one shows a lamp."""
+TASK_STREAM = 2
+"""Keeps the drawing of an example's task apart from its noise."""
 
 LATENT_PX = 8
 """Pixels along a latent's side."""
@@ -32,7 +33,7 @@ LATENT_PX = 8
 class ViewExamples:
     """Overlapping views of one room under one light, and one lamp to harmonize."""
 
-    groups: LitGroups
+    sets: LitSets
     data: DataSettings
     model: MultiViewSettings
     seed: int
@@ -44,35 +45,28 @@ class ViewExamples:
         References are views that show the lamp, and never all views: something is left to learn.
         A fraction of the examples loses its condition, for guidance.
         """
-        rng = numpy_generator(self.seed, key.position)
-        views, lamp = self._views_with_lamp(key.views, rng)
-        masks = np.stack([view.masks[lamp] for view in views]).astype(np.float32)
+        crops = set_with_lamp(self.sets, key.position, key.views)
+        rng = numpy_generator(self.seed, key.position, TASK_STREAM)
+        masks = np.stack([crop.masks[0] for crop in crops]).astype(np.float32)
         is_reference = self._references(masks.any((1, 2)), rng)
-        off = bool(views[0].on[lamp]) and rng.random() < self.data.one_light_off_ratio
+        off = bool(crops[0].on[0]) and rng.random() < self.data.one_light_off_ratio
+        targets = _off(crops) if off else _olats(crops, is_reference, rng)
         if rng.random() < self.model.reference_dropout:
             is_reference[:] = False
             masks[:] = 0
         height, width = masks.shape[-2:]
         example = {
-            "photo": torch.stack([chw(agx(view.image_linear)) for view in views]),
-            "target": torch.stack([chw(p) for p in _targets(views, lamp, off, is_reference, rng)]),
+            "photo": _stacked([agx(c.image_linear * np.float32(c.exposure)) for c in crops]),
+            "target": _stacked(targets),
             "mask": torch.from_numpy(masks)[:, None],
             "rays": plucker_rays(
-                [view.camera for view in views], height // LATENT_PX, width // LATENT_PX
+                [crop.camera for crop in crops], height // LATENT_PX, width // LATENT_PX
             ),
             "is_reference": torch.from_numpy(is_reference),
-            "present": torch.ones(len(views), dtype=torch.bool),
+            "present": torch.ones(len(crops), dtype=torch.bool),
         }
         padded = {name: _padded(value, key.views) for name, value in example.items()}
         return {**padded, "task": torch.tensor(float(off))}
-
-    def _views_with_lamp(self, count: int, rng: Generator) -> tuple[list[LitView], int]:
-        for _ in range(ATTEMPTS):
-            views = recompose(self.groups.group(int(rng.integers(2**31)), count)[:count], rng)
-            shown = np.flatnonzero(np.any([view.masks.any((1, 2)) for view in views], axis=0))
-            if len(shown):
-                return views, int(rng.choice(shown))
-        raise InputError(f"none of {ATTEMPTS} groups of training photos shows a lamp.")
 
     def _references(self, shows_lamp: np.ndarray, rng: Generator) -> np.ndarray:
         chosen = np.zeros(len(shows_lamp), bool)
@@ -85,17 +79,24 @@ class ViewExamples:
         return chosen
 
 
-def _targets(
-    views: list[LitView], lamp: int, off: bool, is_reference: np.ndarray, rng: Generator
+def _off(crops: list[LitCrop]) -> list[Float[np.ndarray, "h w 3"]]:
+    return [agx(one_light_off(crop, 0) * np.float32(crop.exposure)) for crop in crops]
+
+
+def _olats(
+    crops: list[LitCrop], is_reference: Bool[np.ndarray, " v"], rng: Generator
 ) -> list[Float[np.ndarray, "h w 3"]]:
-    """Lit pictures: all at one exposure, taken from the references as at inference."""
-    if off:
-        return [agx(view.image_linear - view.lights[lamp]) for view in views]
+    """OLATs of all views at one exposure, taken from the references as at inference."""
     given = np.flatnonzero(is_reference)
-    measured = given if len(given) else range(len(views))
-    exposure = olat_exposure([views[i].lights[lamp] for i in measured])
-    exposure_ev = float(rng.choice(BRACKETS_EV))
-    return [olat_picture(view.lights[lamp], exposure, exposure_ev) for view in views]
+    measured = given if len(given) else range(len(crops))
+    exposure = olat_exposure([crops[i].lights[0] for i in measured])
+    exposure_ev = BRACKETS_EV[rng.integers(len(BRACKETS_EV))]
+    return [olat_picture(crop.lights[0], exposure, exposure_ev) for crop in crops]
+
+
+def _stacked(pictures: list[Float[np.ndarray, "h w 3"]]) -> Float[Tensor, "v 3 h w"]:
+    size = (pictures[0].shape[0], pictures[0].shape[1])
+    return torch.cat([to_tensor(picture, size) for picture in pictures])
 
 
 def _padded(tensor: Tensor, views: int) -> Tensor:

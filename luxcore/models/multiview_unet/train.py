@@ -9,7 +9,7 @@ from luxcore.models.diffusion.command import train_command
 from luxcore.models.diffusion.events import Listener
 from luxcore.models.diffusion.loop import train
 from luxcore.models.diffusion.options import training_digest
-from luxcore.models.diffusion.rooms import open_groups
+from luxcore.models.diffusion.rooms import open_sets
 from luxcore.models.multiview_unet.examples import ViewExamples
 from luxcore.models.multiview_unet.trainee import MultiViewTrainee
 from luxcore.models.multiview_unet.weights_folder import load_base
@@ -19,12 +19,11 @@ from luxcore.settings.paper_models import MultiViewTraining
 def train_multiview(settings: MultiViewTraining, out: Path, listener: Listener) -> Path:
     """Train the paper's multi-view model, or go on from the newest checkpoint in the folder."""
     out.mkdir(parents=True, exist_ok=True)
+    seed = settings.loop.seed
     model = load_base(settings.model)
     if settings.loop.gradient_checkpointing:
         model.module.unet.enable_gradient_checkpointing()
-    examples = ViewExamples(
-        open_groups(settings.data), settings.data, settings.model, settings.loop.seed
-    )
+    examples = ViewExamples(open_sets(settings.data, seed), settings.data, settings.model, seed)
     trainee = MultiViewTrainee(model, examples, settings)
     return train(trainee, settings.phases, settings.loop, out, training_digest(settings), listener)
 
