@@ -15,10 +15,10 @@ from jaxtyping import Float
 
 from luxcore.errors import InputError
 from luxcore.explorer.codes import LOSSLESS, SLOPE, encode, fit_webp, span_of
+from luxcore.explorer.levels import split_scale
 from luxcore.files.atomic import atomic_file
 from luxcore.light import agx_glsl
 from luxcore.light.blackbody import blackbody_rgb
-from luxcore.light.levels import split_scale
 
 MAX_BYTES = 4_000_000
 """Size that a page should not exceed: it is sent by mail and opened on phones."""
@@ -113,7 +113,9 @@ def _nearest_kelvin(colour: np.ndarray) -> int:
     """Where the temperature slider rests for a colour; daylight for a neutral one."""
     if np.ptp(colour) < 1e-3:
         return DAYLIGHT_K
-    return min(KELVINS, key=lambda k: float(np.abs(_temperature_rgb(k) - colour).sum()))
+    return min(
+        KELVINS, key=lambda k: float(np.abs(_temperature_rgb(k) - colour / colour.max()).sum())
+    )
 
 
 def _shrink_factor(size: tuple[int, ...]) -> float:

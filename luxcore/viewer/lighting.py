@@ -1,17 +1,15 @@
-"""What a person has chosen in the viewer, and the weight of every light that follows from it."""
+"""What a person has chosen in the viewer, and the lamp settings that follow from it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from jaxtyping import Float
-
-from luxcore.light.levels import split_scale
+from luxcore.splats.light_views import AMBIENT
+from luxcore.splats.relighting import LampSetting
+from luxcore.splats.scene import Scene
 
 Tone = Literal["AgX", "standard"]
-AMBIENT = "ambient"
 MAX_STOPS = 6.0
 Colour = tuple[float, float, float]
 
@@ -22,7 +20,7 @@ class Row:
 
     on: bool
     stops: float = 0.0
-    """Relative to its level in the photos, -MAX_STOPS..MAX_STOPS."""
+    """Relative to its brightness in the photos, -MAX_STOPS..MAX_STOPS."""
     colour: Colour | None = None
     """Linear RGB in 0..1; None is its own colour in the photos."""
 
@@ -39,38 +37,27 @@ class Lighting:
 
     def with_row(self, index: int, row: Row) -> Lighting:
         """A copy in which one row is another."""
-        return replace(self, rows=(*self.rows[:index], row, *self.rows[index + 1 :]))
+        rows = (*self.rows[:index], row, *self.rows[index + 1 :])
+        return Lighting(rows, self.solo, self.exposure_ev, self.tone)
+
+    def lit(self, index: int) -> bool:
+        """Whether a row gives light."""
+        return self.rows[index].on if self.solo is None else self.solo == index
 
 
-@dataclass(frozen=True)
-class Lamps:
-    """The lights of a scene as they were in the photos, ambient first."""
+def light_names(scene: Scene) -> tuple[str, ...]:
+    """Names of the rows: the ambient light, then the lamps."""
+    return (AMBIENT, *(lamp.name for lamp in scene.lamps))
 
-    names: tuple[str, ...]
-    level: Float[np.ndarray, " m"]
-    colour: Float[np.ndarray, "m 3"]
-    on: tuple[bool, ...]
 
-    @staticmethod
-    def from_scale(names: tuple[str, ...], scale: Float[np.ndarray, "k 3"]) -> Lamps:
-        """Lamps from their linear RGB in the photos; the ambient light is put before them."""
-        lamps = split_scale(scale)
-        return Lamps(
-            (AMBIENT, *names),
-            np.concatenate([[1.0], lamps.level]),
-            np.concatenate([np.ones((1, 3)), lamps.colour]),
-            (True, *(bool(on) for on in lamps.on)),
-        )
+def original_lighting(scene: Scene) -> Lighting:
+    """The lighting of the photos."""
+    return Lighting((Row(True), *(Row(lamp.on) for lamp in scene.lamps)))
 
-    def original(self) -> Lighting:
-        """The lighting of the photos."""
-        return Lighting(tuple(Row(on) for on in self.on))
 
-    def weights(self, lighting: Lighting) -> Float[np.ndarray, "m 3"]:
-        """Linear RGB factor of every light, float32; dark rows are 0."""
-        weights = np.zeros((len(self.names), 3), np.float32)
-        for i, row in enumerate(lighting.rows):
-            if row.on if lighting.solo is None else lighting.solo == i:
-                colour = self.colour[i] if row.colour is None else np.array(row.colour)
-                weights[i] = self.level[i] * 2.0**row.stops * colour
-        return weights
+def lamp_settings(names: tuple[str, ...], lighting: Lighting) -> dict[str, LampSetting]:
+    """What each light is asked to do; a dark row has intensity 0."""
+    return {
+        name: LampSetting(2.0**row.stops if lighting.lit(i) else 0.0, row.colour)
+        for i, (name, row) in enumerate(zip(names, lighting.rows, strict=True))
+    }

@@ -10,7 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from luxcore.errors import InputError
 from luxcore.files.atomic import write_json
-from luxcore.viewer.lighting import MAX_STOPS, Lamps, Lighting, Row, Tone
+from luxcore.splats.scene import Scene
+from luxcore.viewer.lighting import (
+    MAX_STOPS,
+    Lighting,
+    Row,
+    Tone,
+    light_names,
+    original_lighting,
+)
 
 Channel = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -30,26 +38,26 @@ class _Preset(BaseModel):
     lights: dict[str, _Row]
 
 
-def save_preset(path: Path, lamps: Lamps, lighting: Lighting) -> None:
+def save_preset(path: Path, scene: Scene, lighting: Lighting) -> None:
     """Write the lighting; linear RGB colours, stops relative to the photos."""
-    write_json(path, preset_value(lamps, lighting))
+    write_json(path, preset_value(scene, lighting))
 
 
-def preset_value(lamps: Lamps, lighting: Lighting) -> dict:
+def preset_value(scene: Scene, lighting: Lighting) -> dict:
     """The preset as a JSON value. A solo row is stored as what it shows: the others off."""
     lights = {
         name: {
-            "on": row.on if lighting.solo is None else i == lighting.solo,
+            "on": lighting.lit(i),
             "stops": row.stops,
             "colour": None if row.colour is None else list(row.colour),
         }
-        for i, (name, row) in enumerate(zip(lamps.names, lighting.rows, strict=True))
+        for i, (name, row) in enumerate(zip(light_names(scene), lighting.rows, strict=True))
     }
     tone, exposure_ev = lighting.tone, lighting.exposure_ev
     return {"version": 1, "exposure_ev": exposure_ev, "tone": tone, "lights": lights}
 
 
-def load_preset(text: str, source: str, lamps: Lamps) -> Lighting:
+def load_preset(text: str, source: str, scene: Scene) -> Lighting:
     """The lighting of a preset; lamps that it does not name stay as in the photos.
 
     Raises InputError naming `source` and the fact, for one a lamp that is not in the scene.
@@ -62,13 +70,14 @@ def load_preset(text: str, source: str, lamps: Lamps) -> Lighting:
         raise InputError(f"{source}: {where}: {first['msg'].lower()}.") from error
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{source} is not a lighting preset: {error}.") from error
+    names = light_names(scene)
     for name in preset.lights:
-        if name not in lamps.names:
-            known = ", ".join(lamps.names)
+        if name not in names:
+            known = ", ".join(names)
             raise InputError(f"{source} sets {name!r}, which is not in this scene; it has {known}.")
     rows = tuple(
         _row(preset.lights[name]) if name in preset.lights else row
-        for name, row in zip(lamps.names, lamps.original().rows, strict=True)
+        for name, row in zip(names, original_lighting(scene).rows, strict=True)
     )
     return Lighting(rows, None, preset.exposure_ev, preset.tone)
 

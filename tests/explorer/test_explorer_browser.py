@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.browser
 
+# The colours of the fixture's lamps at luminance 1: layers are stored at the lamp's luminance.
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+DESK = np.array([1.0, 0.75, 0.5]) / (np.array([1.0, 0.75, 0.5]) @ LUMINANCE)
+WALL = np.array([0.4, 0.45, 0.5]) / (np.array([0.4, 0.45, 0.5]) @ LUMINANCE)
+
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory, photo: Photo) -> Path:
@@ -69,8 +74,8 @@ def stored_layers(page_file: Path) -> list[np.ndarray]:
 @pytest.mark.parametrize(
     ("state", "weights", "ev"),
     [
-        ("", [[1, 1, 1], [1, 0.75, 0.5], [0.8, 0.9, 1]], 0),
-        ("l0=0,0,o&l1=1,3,xff0000&l2=1,-1,o", [[0, 0, 0], [8, 0, 0], [0.4, 0.45, 0.5]], 0),
+        ("", [[1, 1, 1], DESK, WALL], 0),
+        ("l0=0,0,o&l1=1,3,xff0000&l2=1,-1,o", [[0, 0, 0], [8, 0, 0], 0.5 * WALL], 0),
         ("ev=-4&solo=2&l2=0,6,x8000ff", [[0] * 3, [0] * 3, [64 * 0.21586, 0, 64]], -4),
         ("ev=6&l1=0,0,o&l2=0,0,o", [[1, 1, 1], [0] * 3, [0] * 3], 6),
     ],

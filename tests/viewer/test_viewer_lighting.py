@@ -8,46 +8,55 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from viewer_scene import room_scene
 
 from luxcore.cameras import look_at
 from luxcore.errors import InputError
 from luxcore.light.agx import agx
+from luxcore.splats.relighting import mixing_weights
 from luxcore.viewer.colours import Colours, tone_map
-from luxcore.viewer.lighting import Lamps, Row
+from luxcore.viewer.lighting import (
+    Lighting,
+    Row,
+    lamp_settings,
+    light_names,
+    original_lighting,
+)
 from luxcore.viewer.path import camera_path
 from luxcore.viewer.presets import load_preset, save_preset
 
-SCALE = np.array([[2.0, 1.0, 0.5], [0.0, 0.0, 0.0], [0.3, 0.4, 0.4]])
-LAMPS = Lamps.from_scale(("desk", "wall", "floor"), SCALE)
+SCENE = room_scene()
+ORIGINAL = original_lighting(SCENE)
+
+
+def weights(lighting: Lighting) -> np.ndarray:
+    return mixing_weights(SCENE, lamp_settings(light_names(SCENE), lighting))
 
 
 def test_original_lighting_is_the_scale_of_the_photos() -> None:
-    expected = np.vstack([np.ones((1, 3)), SCALE])
-    np.testing.assert_allclose(LAMPS.weights(LAMPS.original()), expected, atol=1e-7)
-
-
-def test_switching_on_a_lamp_that_was_off_does_something() -> None:
-    lit = LAMPS.original().with_row(2, Row(True))
-    assert LAMPS.weights(lit)[2] == pytest.approx(np.full(3, 1.2))
+    expected = [[1, 1, 1], [2, 1, 0.5], [0, 0, 0], [0.3, 0.4, 0.4]]
+    np.testing.assert_allclose(weights(ORIGINAL), expected)
+    np.testing.assert_allclose(weights(ORIGINAL), mixing_weights(SCENE))
 
 
 def test_stops_colour_and_solo() -> None:
-    lighting = LAMPS.original().with_row(1, Row(True, 1.0, (0.5, 1.0, 0.0)))
-    np.testing.assert_allclose(LAMPS.weights(lighting)[1], [2.0, 4.0, 0.0])
-    alone = LAMPS.weights(replace(lighting, solo=3))
+    lighting = ORIGINAL.with_row(1, Row(True, 1.0, (0.5, 1.0, 0.0)))
+    luminance = 2 * 0.2126 + 0.7152 + 0.5 * 0.0722
+    np.testing.assert_allclose(weights(lighting)[1], 2 * luminance * np.array([0.5, 1.0, 0.0]))
+    alone = weights(replace(lighting, solo=3))
     assert not alone[:3].any()
-    np.testing.assert_allclose(alone[3], SCALE[2], atol=1e-7)
+    np.testing.assert_allclose(alone[3], [0.3, 0.4, 0.4])
 
 
 def test_a_preset_comes_back_as_it_was(tmp_path: Path) -> None:
     lighting = replace(
-        LAMPS.original().with_row(1, Row(False, -1.5, (0.1, 0.2, 1.0))),
+        ORIGINAL.with_row(1, Row(False, -1.5, (0.1, 0.2, 1.0))),
         exposure_ev=0.5,
         tone="standard",
     )
-    save_preset(tmp_path / "evening.json", LAMPS, lighting)
+    save_preset(tmp_path / "evening.json", SCENE, lighting)
     text = (tmp_path / "evening.json").read_text()
-    assert load_preset(text, "evening.json", LAMPS) == lighting
+    assert load_preset(text, "evening.json", SCENE) == lighting
 
 
 @pytest.mark.parametrize(
@@ -65,12 +74,12 @@ def test_a_preset_comes_back_as_it_was(tmp_path: Path) -> None:
 )
 def test_a_bad_preset_is_one_sentence(text: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence) as caught:
-        load_preset(text, "evening.json", LAMPS)
+        load_preset(text, "evening.json", SCENE)
     assert "\n" not in str(caught.value)
 
 
 def test_a_solo_row_is_saved_as_what_it_shows(tmp_path: Path) -> None:
-    save_preset(tmp_path / "p.json", LAMPS, replace(LAMPS.original(), solo=1))
+    save_preset(tmp_path / "p.json", SCENE, replace(ORIGINAL, solo=1))
     lights = json.loads((tmp_path / "p.json").read_text())["lights"]
     assert [name for name, row in lights.items() if row["on"]] == ["desk"]
 

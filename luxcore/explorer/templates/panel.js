@@ -19,6 +19,9 @@ function colourText(code) {
   return code[0] === "x" ? `#${code.slice(1)}` : "as in the photo";
 }
 
+// A lamp's own colour has luminance 1, so a channel may exceed what a swatch can show.
+const swatch = (rgb) => hexFromLinear(rgb.map((v) => v / Math.max(1, ...rgb)));
+
 function buildRow(row, i) {
   const element = find("row").content.cloneNode(true).firstElementChild;
   const part = (selector) => element.querySelector(selector);
@@ -54,7 +57,7 @@ function showRow(element, i) {
     const kelvin = row.colour[0] === "k" ? Number(row.colour.slice(1)) : scene.rows[i].kelvin;
     part(".kelvin").value = sliderFromKelvin(kelvin);
   }
-  part(".rgb").value = hexFromLinear(rowColour(scene, state, i));
+  part(".rgb").value = swatch(rowColour(scene, state, i));
   part(".own").disabled = row.colour === "o";
   part(".solo").setAttribute("aria-pressed", String(state.solo === i));
 }

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from luxcore.light.blackbody import LUMINANCE_709
+
 OFF_BELOW = 1e-4
 """A lamp whose scale is below this share of the brightest counts as off in the photo."""
 
@@ -16,9 +18,10 @@ class LampLevels:
     """scale = on · level · colour, per lamp."""
 
     level: Float[np.ndarray, " k"]
-    """Largest channel of the scale; for a lamp that was off, the median of the others (else 1)."""
+    """Luminance of the scale; for a lamp that was off, the median of the others (else 1)."""
     colour: Float[np.ndarray, "k 3"]
-    """Linear RGB, largest channel 1; white for a lamp that was off."""
+    """Linear RGB of luminance 1; white for a lamp that was off. Another colour in its place keeps
+    the lamp's luminance when it is white, as in `luxcore.splats.relighting`."""
     on: Bool[np.ndarray, " k"]
 
 
@@ -29,7 +32,7 @@ def split_scale(scale: Float[np.ndarray, "k 3"]) -> LampLevels:
     Negative channels, which least squares may leave behind, count as 0.
     """
     scale = np.clip(np.asarray(scale, np.float64).reshape(-1, 3), 0.0, None)
-    level = scale.max(axis=1)
+    level = scale @ LUMINANCE_709
     on = level > OFF_BELOW * max(float(level.max(initial=0.0)), OFF_BELOW)
     usual = float(np.median(level[on])) if on.any() else 1.0
     colour = np.ones_like(scale)
