@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from luxcore.settings.base import Settings
+from luxcore.settings.train_sv import TrainingSettings
 
 
-class TrainMvSettings(Settings):
+class TrainMvSettings(TrainingSettings):
     """Knobs of the train_mv stage."""

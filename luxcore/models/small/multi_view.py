@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -24,7 +24,7 @@ from luxcore.models.small.grid import (
 from luxcore.models.small.multiview import KnownLight, TargetView, multiview_features
 from luxcore.models.small.network import LampNet
 from luxcore.models.small.samples import chw
-from luxcore.models.small.single_view import finish, run_network
+from luxcore.models.small.single_view import finish, run_network, with_unseen
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,17 @@ class SmallHarmonizer:
         return [self._decompose(view, [k for k in known if k is not None]) for view in views]
 
     def _decompose(self, view: View, references: Sequence[KnownLight]) -> Decomposition:
+        told = np.array(
+            [bool(any(r.known[k] for r in references)) for k in range(len(view.on))], bool
+        )
+        heard_of = view.masks.any((1, 2)) | told
+        if not heard_of.all():
+            part = self._decompose(
+                _with_lamps(view, heard_of), [_known_lamps(r, heard_of) for r in references]
+            )
+            return with_unseen(part, heard_of)
         target, camera = self._target(view)
-        features = multiview_features(target, camera, references)
+        features = multiview_features(target, camera, references, warp=self.warp)
         fields = run_network(self.net, features, target.on)
         return finish(fields, target.photo, view.image_linear, view.masks, target.on)
 
@@ -70,7 +79,7 @@ class SmallHarmonizer:
             to_grid(chw(olat * factor), (height, width))
             for olat, factor in zip(reference.light.olat, scale, strict=True)
         ]
-        known = torch.from_numpy(reference.known & self.warp)
+        known = torch.from_numpy(reference.known)
         return KnownLight(
             camera, target.photo, target.masks, target.surfaces, _stack(lights, target), known
         )
@@ -86,6 +95,17 @@ class SmallHarmonizer:
         photo, masks = photo_to_grid(view.image_linear, size), masks_to_grid(view.masks, size)
         on: Bool[Tensor, " k"] = torch.from_numpy(view.on)
         return TargetView(photo, masks, on, surfaces), camera
+
+
+def _with_lamps(view: View, kept: Bool[np.ndarray, " k"]) -> View:
+    return replace(view, masks=view.masks[kept], on=view.on[kept])
+
+
+def _known_lamps(light: KnownLight, kept: Bool[np.ndarray, " k"]) -> KnownLight:
+    index = torch.from_numpy(kept)
+    return replace(
+        light, masks=light.masks[index], lights=light.lights[index], known=light.known[index]
+    )
 
 
 def _stack(lights: list[Tensor], target: TargetView) -> Float[Tensor, "k 3 h w"]:

@@ -46,13 +46,16 @@ class TargetView:
 
 
 def multiview_features(
-    target: TargetView, camera: Camera, references: Sequence[KnownLight]
+    target: TargetView, camera: Camera, references: Sequence[KnownLight], *, warp: bool = True
 ) -> Float[Tensor, "k c h w"]:
-    """The MV_CHANNELS channels of every lamp: the single-view ones, warped light, Plücker rays."""
+    """The MV_CHANNELS channels of every lamp: the single-view ones, warped light, Plücker rays.
+
+    `warp=False` leaves the warped light out: an ablation.
+    """
     k = len(target.on)
     centres = lamp_points(target, camera, references)
     single = lamp_features(target.photo, target.masks, target.on, target.surfaces, centres)
-    ratio, weight = _warped_ratio(target, camera, references)
+    ratio, weight = _warped_ratio(target, camera, references if warp else ())
     on = target.on.view(k, 1, 1, 1)
     fraction = ratio.clamp(0, 1.5) * on
     log_ratio = torch.log(ratio + 1e-3) / 4 * ~on * (weight > 0)

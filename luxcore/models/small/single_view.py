@@ -41,6 +41,10 @@ class SmallDecomposer:
         seed: int,
     ) -> Decomposition:
         """See `luxcore.models.interface.Decomposer`; `seed` changes nothing here."""
+        seen = masks.any((1, 2))
+        if not seen.all():
+            part = self.decompose(image_linear, masks[seen], on[seen], geometry, seed)
+            return with_unseen(part, seen)
         height, width = image_linear.shape[:2]
         size = grid_size(height, width, self.long_side_px, self.net.shape.stride)
         small = photo_to_grid(image_linear, size)
@@ -82,6 +86,14 @@ def finish(
     lights, ambient = keep_out_of_emitters(lights, ambient, emitter_masks(photo, covered), on)
     scale = on.float()[:, None].expand(-1, 3)
     return Decomposition(_hwc(ambient), _hwc(lights), scale.numpy().copy())
+
+
+def with_unseen(part: Decomposition, seen: Bool[np.ndarray, " k"]) -> Decomposition:
+    """Lamps that the photo does not show get no light: what they send belongs to ambient."""
+    olat = np.zeros((len(seen), *part.ambient.shape), np.float32)
+    scale = np.zeros((len(seen), 3), np.float32)
+    olat[seen], scale[seen] = part.olat, part.scale
+    return Decomposition(part.ambient, olat, scale)
 
 
 def _hwc(image: Tensor) -> np.ndarray:

@@ -1,0 +1,87 @@
+"""Decompose one photo with any backend, solve its scale factors, and check that it adds up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from luxcore.decompose.burning import burning_lamps
+from luxcore.errors import DivergedError, InputError
+from luxcore.light.agx import agx
+from luxcore.models.interface import Decomposer, Decomposition, Geometry
+
+
+@dataclass(frozen=True)
+class PhotoLight:
+    """A decomposed photo. `recomposition_db` is the PSNR of tonemap(ambient + Σ c·OLAT) against
+    the photo as displayed (paper, eq. 1)."""
+
+    light: Decomposition
+    on: Bool[np.ndarray, " k"]
+    recomposition_db: float
+
+
+def decompose_photo(
+    image_linear: Float[np.ndarray, "h w 3"],
+    masks: Bool[np.ndarray, "k h w"],
+    decomposer: Decomposer,
+    *,
+    on: Bool[np.ndarray, " k"] | None = None,
+    geometry: Geometry | None = None,
+    exposure: float = 1.0,
+    seed: int = 0,
+) -> PhotoLight:
+    """Take a photo apart. Radiance in, radiance out; the photo is AgX(exposure · image_linear).
+
+    `on` defaults to what the masks' brightness says. The factors c of burning lamps are solved by
+    weighted least squares; lamps that are off keep 0.
+    Raises InputError for masks of another size, DivergedError when the model's answer is not
+    finite.
+    """
+    if masks.shape[1:] != image_linear.shape[:2]:
+        raise InputError(
+            f"masks are {masks.shape[2]}x{masks.shape[1]}, "
+            f"the photo is {image_linear.shape[1]}x{image_linear.shape[0]}."
+        )
+    exposed = np.maximum(image_linear, 0).astype(np.float32) * np.float32(exposure)
+    burning = burning_lamps(exposed, masks) if on is None else on
+    light = decomposer.decompose(exposed, masks, burning, geometry, seed)
+    check_finite(light, decomposer.name)
+    light = replace(light, scale=solved_scale(exposed, light, burning))
+    return PhotoLight(scaled_by(light, 1 / exposure), burning, recomposition_db(exposed, light))
+
+
+def solved_scale(
+    exposed: Float[np.ndarray, "h w 3"], light: Decomposition, on: Bool[np.ndarray, " k"]
+) -> Float[np.ndarray, "k 3"]:
+    """RGB factors c of the burning lamps that best rebuild the photo; 0 for the others."""
+    from luxcore.light.scale_factors import solve
+
+    scale = np.zeros((len(on), 3), np.float32)
+    if on.any():
+        scale[on] = solve(exposed, light.ambient, light.olat[on])
+    return scale
+
+
+def recomposition_db(exposed: Float[np.ndarray, "h w 3"], light: Decomposition) -> float:
+    """PSNR in dB, at most 99, of the recomposed photo against the photo, both through AgX."""
+    error = float(np.mean((agx(light.recomposed()) - agx(exposed)) ** 2, dtype=np.float64))
+    return min(99.0, -10 * math.log10(max(error, 1e-10)))
+
+
+def scaled_by(light: Decomposition, factor: float) -> Decomposition:
+    """The same decomposition in other units of radiance; scales are ratios and stay."""
+    if factor == 1:
+        return light
+    f = np.float32(factor)
+    return Decomposition(light.ambient * f, light.olat * f, light.scale)
+
+
+def check_finite(light: Decomposition, model: str) -> None:
+    """Raises DivergedError naming the model when a value is NaN or infinite."""
+    for name, values in (("ambient", light.ambient), ("lamp", light.olat), ("scale", light.scale)):
+        if not np.isfinite(values).all():
+            raise DivergedError(f"model {model} produced {name} light that is not finite.")

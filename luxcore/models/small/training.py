@@ -1,0 +1,227 @@
+"""Train or fine-tune the small models on rendered rooms; never hand on worse weights than the base.
+
+The same code serves the short fine-tuning of the train stages and the full recipe
+(`luxcore.models.small.train`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.random import PCG64, Generator, SeedSequence
+from torch import Tensor
+
+from luxcore.data.compact import list_rendered, read_metadata
+from luxcore.data.multiview import MultiViewSets
+from luxcore.errors import InputError
+from luxcore.files.atomic import write_json
+from luxcore.files.digests import value_digest
+from luxcore.models.small.batches import GroupBatches, SingleBatches, group_example
+from luxcore.models.small.examples import Example, to_example
+from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
+from luxcore.models.small.fit import Batches, FitResult, FitSettings, fit
+from luxcore.models.small.network import LampNet, NetworkShape
+from luxcore.models.small.pictures import validation_sheet
+from luxcore.models.small.samples import CropPool
+from luxcore.models.small.scores import mean_psnr
+from luxcore.models.small.sketch import SketchRooms
+from luxcore.models.small.weights import load_network, save_weights, shipped_weights
+from luxcore.settings.train_mv import TrainMvSettings
+from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
+
+WIDTHS = (40, 80, 160, 224)
+SKETCH_ROOMS = 100_000
+
+Cases = Sequence[tuple[Tensor, Example]]
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What a training gave, in the files that it wrote and in numbers."""
+
+    metrics: dict[str, float]
+    curve: list[dict[str, float]]
+    picture: np.ndarray
+
+
+def train_sv(
+    dataset_dir: Path,
+    out: Path,
+    settings: TrainSvSettings,
+    seed: int,
+    *,
+    base: Path | None = None,
+    checkpoint: Path | None = None,
+) -> TrainingResult:
+    """Train the single-view model on the rendered views below `dataset_dir`.
+
+    Writes `model.safetensors`, `card.json` and `curve.json` into `out`. `base` are weights to
+    start from (default: as the settings say). With `checkpoint` an interrupted training goes on
+    where it was, to the same bits.
+    """
+    pool, aside = pools(dataset_dir, settings, seed)
+    net = start_network("sv", SV_CHANNELS, base_weights("sv", settings, base), seed)
+    batches = SingleBatches(pool, seed, settings.photos_per_step, settings.geometry_share)
+    cases = single_cases(aside, seed)
+    return _train("sv", net, batches, cases, settings, out, checkpoint, dataset_dir)
+
+
+def train_mv(
+    dataset_dir: Path,
+    out: Path,
+    settings: TrainMvSettings,
+    seed: int,
+    *,
+    base: Path | None = None,
+    checkpoint: Path | None = None,
+) -> TrainingResult:
+    """Train the multi-view model; see `train_sv`. From scratch it starts from the shipped
+    single-view weights, whose channels it shares."""
+    pool, aside = pools(dataset_dir, settings, seed)
+    net = start_network("mv", MV_CHANNELS, base_weights("mv", settings, base), seed)
+    batches = GroupBatches(pool, seed, settings.photos_per_step)
+    return _train(
+        "mv", net, batches, group_cases(aside, seed), settings, out, checkpoint, dataset_dir
+    )
+
+
+def pools(dataset_dir: Path, settings: TrainingSettings, seed: int) -> tuple[CropPool, CropPool]:
+    """(training, validation) photos: validation has the last rooms, where there are several."""
+    stems = list_rendered(dataset_dir)
+    rooms = sorted({str(read_metadata(stem).get("room")) for stem in stems})
+    kept_rooms = max(1, len(rooms) - max(1, len(rooms) // 10)) if len(rooms) > 1 else 1
+    training = [s for s in stems if str(read_metadata(s).get("room")) in rooms[:kept_rooms]]
+    aside = [s for s in stems if s not in set(training)] or stems
+    size = (settings.size_px, settings.size_px)
+    views = settings.views_per_group
+    sets = MultiViewSets(training, size, seed, views_per_set=views, relit=False)
+    pool = CropPool.collect(sets, range(settings.groups), views)
+    if settings.sketches:
+        sketches = SketchRooms(SKETCH_ROOMS, settings.size_px, seed)
+        pool = pool + CropPool.collect(sketches, range(settings.sketches), views)
+    # Another seed: where there is one room only, at least its photos are others.
+    held_out = MultiViewSets(aside, size, seed + 1, views_per_set=views, relit=False)
+    return pool, CropPool.collect(held_out, range(settings.validation_groups), views)
+
+
+def start_network(kind: str, inputs: int, base: Path | None, seed: int) -> LampNet:
+    """The network to train: from `base`, else new; a new multi-view network takes the shipped
+    single-view weights for the channels that both have."""
+    if base is not None:
+        return load_network(base, kind)
+    torch.manual_seed(seed)
+    net = LampNet(NetworkShape(inputs, WIDTHS))
+    if kind == "mv" and shipped_weights("sv").is_file():
+        widen(load_network(shipped_weights("sv"), "sv"), net)
+    return net
+
+
+def widen(narrow: LampNet, wide: LampNet) -> None:
+    """Copy weights of a network with fewer input channels; the further channels start at zero."""
+    block = wide.shape.unshuffle**2
+    weights = narrow.state_dict()
+    stem = torch.zeros_like(wide.stem.weight)
+    stem[:, : narrow.shape.inputs * block] = weights["stem.weight"]
+    wide.load_state_dict({**weights, "stem.weight": stem})
+
+
+def single_cases(pool: CropPool, seed: int) -> Cases:
+    """Every photo once, under a light drawn from its number, without and with geometry in turn."""
+    cases = []
+    for number, crop in enumerate(pool.photos()):
+        rng = Generator(PCG64(SeedSequence((seed, number))))
+        relit = CropPool(((crop,),)).relit(rng)[0]
+        example = to_example(relit, geometry=number % 2 == 1)
+        if len(example.on):
+            features = lamp_features(example.photo, example.masks, example.on, example.surfaces)
+            cases.append((features, example))
+    return cases
+
+
+def group_cases(pool: CropPool, seed: int) -> Cases:
+    """Per group: each further photo with the first one's true light as its reference."""
+    cases = []
+    for number, group in enumerate(pool.groups):
+        rng = Generator(PCG64(SeedSequence((seed, number))))
+        reference, *targets = CropPool((group,)).relit(rng)
+        known = reference.masks.any((1, 2))
+        cases += [group_example(t, [reference], known) for t in targets if known.any()]
+    return cases
+
+
+def base_weights(kind: str, settings: TrainingSettings, base: Path | None) -> Path | None:
+    """Which weights a training starts from: `base`, else what the settings name, else none."""
+    if base is not None:
+        return base
+    if settings.base == "shipped":
+        path = shipped_weights(kind)
+        return path if path.is_file() else None
+    return Path(settings.base) if settings.base else None
+
+
+def _train(
+    kind: str,
+    net: LampNet,
+    batches: Batches,
+    cases: Cases,
+    settings: TrainingSettings,
+    out: Path,
+    checkpoint: Path | None,
+    dataset_dir: Path,
+) -> TrainingResult:
+    if not cases:
+        raise InputError(f"{dataset_dir} shows no lamp in its validation photos.")
+    before = mean_psnr(net.eval(), cases)
+    original = {name: value.detach().clone() for name, value in net.state_dict().items()}
+    result = _fit(net, batches, settings, lambda n: mean_psnr(n, cases), checkpoint)
+    after = result.curve[-1]["psnr_validation"] if result.curve else before
+    improved = after > before
+    chosen = result.weights if improved else original
+    net.load_state_dict(chosen)
+    save_weights(out / "model.safetensors", kind, net.shape, chosen)
+    write_json(out / "curve.json", result.curve)
+    metrics = {
+        "psnr_validation": max(before, after),
+        "psnr_base": before,
+        "psnr_trained": after,
+        "kept_base": float(not improved),
+        "parameters": float(sum(p.numel() for p in net.parameters())),
+    }
+    write_json(out / "card.json", _card(kind, settings, metrics, dataset_dir))
+    return TrainingResult(metrics, result.curve, validation_sheet(net.eval(), cases))
+
+
+def _fit(
+    net: LampNet,
+    batches: Batches,
+    settings: TrainingSettings,
+    validate: Callable[[LampNet], float],
+    checkpoint: Path | None,
+) -> FitResult:
+    if settings.steps == 0:
+        return FitResult(net.state_dict(), [])
+    fitting = FitSettings(
+        settings.steps,
+        settings.rate,
+        warmup=min(50, max(1, settings.steps // 10)),
+        cooldown=settings.cooldown,
+        check_every=settings.check_every,
+    )
+    return fit(net, batches, fitting, validate, checkpoint)
+
+
+def _card(
+    kind: str, settings: TrainingSettings, metrics: dict[str, float], dataset_dir: Path
+) -> dict[str, object]:
+    views = [stem.name for stem in list_rendered(dataset_dir)]
+    return {
+        "kind": kind,
+        "settings": settings.model_dump(mode="json"),
+        "views": len(views),
+        "views_sha256": value_digest(views),
+        "metrics": metrics,
+    }

@@ -1,0 +1,17 @@
+"""Stage train_sv: fine-tune the single-view decomposition model."""
+
+from __future__ import annotations
+
+from luxcore.models.small.training import train_sv
+from tasks.context import StageContext
+
+
+def run(stage: StageContext) -> None:
+    """Write the model, its card and its curve; what is handed on is never worse than the base."""
+    dataset = stage.input("render") / "train"
+    result = train_sv(dataset, stage.out, stage.settings, stage.seed)
+    stage.log_metrics(result.metrics)
+    for row in result.curve:
+        for name in ("loss", "psnr_validation"):
+            stage.log_metric(name, row[name], step=int(row["step"]))
+    stage.log_picture("validation", result.picture)
