@@ -13,8 +13,11 @@ import numpy as np
 
 from luxcore.cameras import Camera, look_at
 from luxcore.capture import Capture, Points, View, write_capture
+from luxcore.files.atomic import write_json
+from luxcore.files.exr import write_exr
 from luxcore.splats.device import open_device
 from luxcore.splats.gaussians import Gaussians, sh_from_color
+from luxcore.splats.light_views import light_names
 from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 
 HALF = np.array([2.0, 1.5, 1.2])
@@ -101,3 +104,24 @@ def write_room_capture(
     rgb = np.round(255 * display(total[chosen])).astype(np.uint8)
     points = Points(xyz.astype(np.float32), rgb)
     return write_capture(folder, "box", shots, points, source="synthetic", metric=True)
+
+
+def write_light_inputs(
+    folder: Path, room: Room, capture: Capture, on: tuple[bool, ...] = (True, True)
+) -> tuple[Path, Path]:
+    """(fuse folder, masks folder) as the stages before would leave them, from the truth."""
+    fuse, masks = folder / "fuse", folder / "masks"
+    n, lights, _ = room.lights.shape
+    for index, frame in enumerate(capture.frames):
+        image = render_colors(room, frame.camera, room.lights.reshape(n, -1))
+        layers = {
+            name: image[..., 3 * m : 3 * m + 3] for m, name in enumerate(light_names(lights - 1))
+        }
+        write_exr(fuse / f"{index:04d}.exr", layers, half=False)
+    write_json(fuse / "fuse.json", {"method": "truth", "exposure": 1.0, "clipped": 0})
+    lamps = [
+        {"index": i, "name": f"lamp_{i}", "on": on[i], "references": [], "areas": {}}
+        for i in range(lights - 1)
+    ]
+    write_json(masks / "lamps.json", lamps)
+    return fuse, masks
