@@ -13,6 +13,8 @@ from luxcore.data.panorama import pixel_directions, sample_padded
 BOX_M = 0.4
 _SIDE = 20
 """A pose is judged by a grid of this many columns."""
+FAR_M = 15.0
+"""What lies farther is outside a window and covers nothing of the room."""
 _NEAR_SHARE = 0.05
 
 
@@ -43,7 +45,7 @@ class Sight:
 def sight(source: ViewSource, pose: Pose, aspect: float) -> Sight:
     """A coarse grid of distances projected into the world (paper, On-the-fly sampling)."""
     distance, directions = _rays(source, pose, max(2, round(_SIDE / aspect)))
-    known = np.isfinite(distance) & (distance > 0)
+    known = (distance > 0) & (distance < FAR_M)
     distance, directions = distance[known], directions[known]
     if distance.size == 0:
         return Sight(frozenset(), 0.0, 0.0)
