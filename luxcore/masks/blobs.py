@@ -15,10 +15,10 @@ from jaxtyping import Bool, Float
 
 from luxcore.light.agx import agx_inverse
 
-WORK_SIDE = 640
+WORK_SIDE = 512
 """Longest side, pixels, at which regions are looked for: lamps are not thinner than its pixels."""
 
-THRESHOLDS = np.linspace(0.985, 0.5, 22)
+THRESHOLDS = np.linspace(0.985, 0.5, 18)
 """Of the mean of the display channels."""
 
 MIN_CORE, MIN_CONTRAST_STOPS, MIN_SOLIDITY = 0.75, 1.0, 0.4
@@ -175,9 +175,11 @@ def _cues(
     far_radius: int,
     cut: int,
 ) -> Cues | None:
-    touching = _dilated(region, 1)
-    near_zone = _dilated(region, near_radius)
-    near, far = near_zone & ~touching, _dilated(region, far_radius) & ~near_zone
+    import cv2
+
+    distance = cv2.distanceTransform((~region).astype(np.uint8), cv2.DIST_L2, 3)
+    near = (distance > 1.5) & (distance <= near_radius)
+    far = (distance > near_radius) & (distance <= far_radius)
     outline = region & ~_eroded(region)
     if min(near.sum(), far.sum(), outline.sum()) < 4:
         return None
@@ -195,14 +197,6 @@ def _cues(
         warmth=float(colour[0] - colour[2]) - planes.scene_warmth,
         sides_cut=int(cut),
     )
-
-
-def _dilated(region: np.ndarray, radius: int) -> np.ndarray:
-    import cv2
-
-    size = 2 * radius + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    return cv2.dilate(region.astype(np.uint8), kernel) > 0
 
 
 def _eroded(region: np.ndarray) -> np.ndarray:

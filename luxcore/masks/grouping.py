@@ -76,7 +76,7 @@ def group_blobs(views: Sequence[ViewBlobs], limit: int) -> list[Group]:
 
 
 def extent(group: Group, views: Sequence[ViewBlobs]) -> float:
-    """Radius of the lamp in world units: half the largest diagonal that any view shows."""
+    """Radius of the lamp in world units: half the diagonal where it shows nearly whole."""
     radii = []
     for view, members in group.members.items():
         camera = views[view].camera
@@ -86,7 +86,7 @@ def extent(group: Group, views: Sequence[ViewBlobs]) -> float:
             grid = camera.width / views[view].labels.shape[1]
             diagonal = grid * np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)
             radii.append(0.5 * diagonal * depth / camera.fx)
-    return float(np.median(radii)) if radii else 0.0
+    return float(np.percentile(radii, 90)) if radii else 0.0
 
 
 def project(

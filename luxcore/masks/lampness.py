@@ -13,8 +13,11 @@ from luxcore.masks.blobs import Blob
 SURE = 4.75
 """The best region of a room must reach this, else the room shows no lamp."""
 
-BELOW_BEST = 1.05
+BELOW_BEST = 0.9
 """Other regions count as lamps when they are at most this much less lamp-like than the best."""
+
+PLENTY = 6.9
+"""A still more lamp-like best region does not raise what is asked of the others."""
 
 WINDOW_AREA = 0.01
 """Fraction of the picture above which a bright region is more and more likely a window."""
@@ -39,3 +42,11 @@ def lampness(blob: Blob, elevation_deg: float) -> float:
     size = 0.25 * min(np.log2(blob.area / 1e-3), 2)
     window = 3 * np.clip((blob.area - WINDOW_AREA) / 0.02, 0, 1)
     return float(shape + light + size - low - window)
+
+
+def needed(best: float) -> float:
+    """The lampness that a region must have in a room whose best region has `best`.
+
+    Infinite where the best is not lamp-like enough for the room to have any.
+    """
+    return min(best, PLENTY) - BELOW_BEST if best >= SURE else np.inf

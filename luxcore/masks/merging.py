@@ -8,18 +8,23 @@ import numpy as np
 
 from luxcore.masks.grouping import Group, ViewBlobs, extent, project
 
-REACH = 0.8
-"""Two pieces belong together when their centres are closer than this times both extents."""
+REACH = 1.25
+"""Two pieces belong together when their centres are closer than this times both extents.
+
+Above 1, since what hides the middle of a lamp hides part of its extent too."""
+
+THIN = 0.6
+"""Width over length up to which a region is a strip."""
+
+ALIGNED = 0.97
+"""Cosine of the angle between strips and the line that joins them, at least: about 14 degrees."""
 
 PIECE_SCORE = 3.5
 """A piece may be less lamp-like than a whole lamp, but not less than this."""
 
 
 def merge_pieces(groups: Sequence[Group], views: Sequence[ViewBlobs]) -> list[Group]:
-    """Join groups whose extents meet in space and that never show between them a gap in all views.
-
-    The order stays that of the first piece.
-    """
+    """Join groups whose extents meet in space, in the order of the first pieces."""
     merged: list[Group] = []
     for group in groups:
         size = extent(group, views)
@@ -53,4 +58,33 @@ def add_pieces(groups: Sequence[Group], views: Sequence[ViewBlobs]) -> None:
 
 def _one_lamp(a: Group, b: Group, b_size: float, views: Sequence[ViewBlobs]) -> bool:
     distance = float(np.linalg.norm(a.place - b.place))
-    return distance < REACH * (extent(a, views) + b_size)
+    if distance < REACH * (extent(a, views) + b_size):
+        return True
+    shared = sorted(set(a.members) & set(b.members))
+    lined_up = [_in_line(views[v], a.members[v][0], b.members[v][0]) for v in shared]
+    return len(shared) >= 2 and float(np.mean(lined_up)) >= 0.5
+
+
+def _in_line(view: ViewBlobs, a: int, b: int) -> bool:
+    """Whether two long regions continue each other, as a strip does behind a column."""
+    centre_a, axis_a, length_a, thin_a = _strip(view, a)
+    centre_b, axis_b, length_b, thin_b = _strip(view, b)
+    link = centre_b - centre_a
+    distance = float(np.linalg.norm(link))
+    if distance < 1e-6 or max(thin_a, thin_b) > THIN:
+        return False
+    straight = min(abs(link @ axis_a), abs(link @ axis_b)) / distance > ALIGNED
+    gap = distance - 0.5 * (length_a + length_b)
+    return bool(straight and gap < max(length_a, length_b))
+
+
+def _strip(view: ViewBlobs, index: int) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Centre, direction, length (work-grid pixels) and width over length of a region."""
+    blob = view.blobs[index]
+    rows, columns = np.nonzero(blob.region)
+    points = np.stack([columns + blob.left, rows + blob.top], axis=1).astype(float)
+    centred = points - points.mean(axis=0)
+    # 1/12 is the variance of one pixel, and 12 times the variance the square of a bar's length.
+    values, axes = np.linalg.eigh(centred.T @ centred / len(points) + np.eye(2) / 12)
+    width, length = np.sqrt(12 * values)
+    return points.mean(axis=0), axes[:, 1], float(length), float(width / length)

@@ -14,7 +14,7 @@ from luxcore.files.photos import read_photo
 from luxcore.masks.blobs import Blob, find_blobs
 from luxcore.masks.grouping import Group, ViewBlobs, extent, group_blobs, view_blobs
 from luxcore.masks.growing import grow_mask
-from luxcore.masks.lampness import BELOW_BEST, SURE, lampness
+from luxcore.masks.lampness import lampness, needed
 from luxcore.masks.merging import add_pieces, merge_pieces
 from luxcore.masks.references import best_views, photo_sharpness
 from luxcore.masks.single import full_mask
@@ -58,13 +58,13 @@ def elevation_deg(blob: Blob, camera: Camera) -> float:
 
 def _lamp_groups(views: list[ViewBlobs], settings: MasksSettings) -> list[Group]:
     groups = group_blobs(views, CANDIDATES * settings.max_lamps)
-    best = max((g.score for g in groups), default=-math.inf)
-    if best < SURE:
+    least = needed(max((g.score for g in groups), default=-math.inf))
+    lamps = [g for g in groups if g.score >= least]
+    if not lamps:
         raise LuxError(
             f"no lamp was found in {len(views)} views: nothing glows like one; give masks named "
             "NNNN_LL.png (view, lamp) in a folder instead, white on black."
         )
-    lamps = [g for g in groups if g.score >= best - BELOW_BEST]
     lamps = merge_pieces(lamps, views)[: settings.max_lamps]
     add_pieces(lamps, views)
     return lamps

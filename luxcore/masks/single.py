@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from luxcore.errors import LuxError
 from luxcore.masks.blobs import Blob, find_blobs, work_size
-from luxcore.masks.lampness import BELOW_BEST, SURE, lampness
+from luxcore.masks.lampness import lampness, needed
 from luxcore.settings.masks import MasksSettings
 
 USUAL_FOCAL = 0.85
@@ -34,10 +34,10 @@ def propose_photo(
         (lampness(blob, _level_elevation_deg(blob, height, width)), blob)
         for blob in find_blobs(photo, settings.min_area, settings.max_area)
     ]
-    best = max((score for score, _ in scored), default=-math.inf)
-    if best < SURE:
+    least = needed(max((score for score, _ in scored), default=-math.inf))
+    chosen = sorted((s for s in scored if s[0] >= least), key=lambda s: -s[0])
+    if not chosen:
         raise LuxError(NO_LAMP)
-    chosen = sorted((s for s in scored if s[0] >= best - BELOW_BEST), key=lambda s: -s[0])
     return [full_mask(blob, height, width) for _, blob in chosen[: settings.max_lamps]]
 
 
