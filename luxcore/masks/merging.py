@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,10 @@ THIN = 0.6
 
 ALIGNED = 0.97
 """Cosine of the angle between strips and the line that joins them, at least: about 14 degrees."""
+
+SAME_WIDTH = 1.8
+MAX_GAP = 1.35
+"""Between the ends of two strips, as a multiple of the longer one."""
 
 PIECE_SCORE = 3.5
 """A piece may be less lamp-like than a whole lamp, but not less than this."""
@@ -66,25 +71,41 @@ def _one_lamp(a: Group, b: Group, b_size: float, views: Sequence[ViewBlobs]) -> 
 
 
 def _in_line(view: ViewBlobs, a: int, b: int) -> bool:
-    """Whether two long regions continue each other, as a strip does behind a column."""
-    centre_a, axis_a, length_a, thin_a = _strip(view, a)
-    centre_b, axis_b, length_b, thin_b = _strip(view, b)
-    link = centre_b - centre_a
+    """Whether two regions continue each other, as a strip does behind a column.
+
+    The longer one must be a strip that points at the other, which is about as wide.
+    """
+    long, short = sorted((_strip(view, a), _strip(view, b)), key=lambda s: -s.length)
+    link = short.centre - long.centre
     distance = float(np.linalg.norm(link))
-    if distance < 1e-6 or max(thin_a, thin_b) > THIN:
-        return False
-    straight = min(abs(link @ axis_a), abs(link @ axis_b)) / distance > ALIGNED
-    gap = distance - 0.5 * (length_a + length_b)
-    return bool(straight and gap < max(length_a, length_b))
+    straight = abs(link @ long.axis) > ALIGNED * distance
+    gap = distance - 0.5 * (long.length + short.length)
+    widths = sorted((long.width, short.width))
+    return bool(
+        long.width < THIN * long.length
+        and straight
+        and widths[1] < SAME_WIDTH * widths[0]
+        and gap < MAX_GAP * long.length
+    )
 
 
-def _strip(view: ViewBlobs, index: int) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Centre, direction, length (work-grid pixels) and width over length of a region."""
+@dataclass(frozen=True)
+class _Strip:
+    """A region as a bar, in pixels of the work grid."""
+
+    centre: np.ndarray
+    axis: np.ndarray
+    length: float
+    width: float
+
+
+def _strip(view: ViewBlobs, index: int) -> _Strip:
     blob = view.blobs[index]
     rows, columns = np.nonzero(blob.region)
     points = np.stack([columns + blob.left, rows + blob.top], axis=1).astype(float)
-    centred = points - points.mean(axis=0)
+    centre = points.mean(axis=0)
     # 1/12 is the variance of one pixel, and 12 times the variance the square of a bar's length.
-    values, axes = np.linalg.eigh(centred.T @ centred / len(points) + np.eye(2) / 12)
+    covariance = (points - centre).T @ (points - centre) / len(points) + np.eye(2) / 12
+    values, axes = np.linalg.eigh(covariance)
     width, length = np.sqrt(12 * values)
-    return points.mean(axis=0), axes[:, 1], float(length), float(width / length)
+    return _Strip(centre, axes[:, 1], float(length), float(width))
