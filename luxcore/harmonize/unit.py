@@ -63,7 +63,7 @@ def harmonize_pass(
 
 def write_target(out_dir: Path, index: int, light: Decomposition, exposure: float) -> None:
     """The linear lights of a view and, per lamp, its three exposures AgX(2^-k · g · I)."""
-    contribution = _as_shown(light)
+    contribution = light.contributions()
     layers = {"ambient": light.ambient}
     layers |= {f"light_{k:02d}": pixels for k, pixels in enumerate(contribution)}
     half = all(float(np.abs(p).max(initial=0)) <= HALF_MAX for p in layers.values())
@@ -72,12 +72,6 @@ def write_target(out_dir: Path, index: int, light: Decomposition, exposure: floa
         for stops in BRACKETS_EV:
             shown = agx(pixels * np.float32(exposure * 2.0**-stops))
             write_png(out_dir / "brackets" / f"{index:04d}_{name}_ev{stops}.png", shown)
-
-
-def _as_shown(light: Decomposition) -> Float[np.ndarray, "k h w 3"]:
-    """Each lamp as the photo has it; a lamp that is off, at scale 1."""
-    off = (light.scale == 0).all(axis=1, keepdims=True)
-    return light.olat * np.where(off, 1, light.scale)[:, None, None].astype(np.float32)
 
 
 def _numbered(lights: Float[np.ndarray, "k h w 3"]) -> dict[str, np.ndarray]:

@@ -50,6 +50,11 @@ class Decomposition:
         """ambient + Σ c_k · olat_k, linear (paper, eq. 1 before the tone curve)."""
         return self.ambient + np.einsum("kc,khwc->hwc", self.scale, self.olat)
 
+    def contributions(self) -> Float[np.ndarray, "k h w 3"]:
+        """Each lamp's light as the photo has it; of a lamp that is off, its light at scale 1."""
+        off = (self.scale == 0).all(axis=1, keepdims=True)
+        return self.olat * np.where(off, 1, self.scale)[:, None, None].astype(np.float32)
+
     def one_light_off(self, lamp: int) -> Float[np.ndarray, "h w 3"]:
         """The photo with one lamp switched off, linear: the paper's second task (LTOFF)."""
         others = self.scale.copy()

@@ -23,9 +23,10 @@ def open_decomposer(settings: BackendSettings) -> Decomposer:
 
 
 def open_harmonizer(settings: BackendSettings) -> Harmonizer:
-    """`mv_weights` is a safetensors file (default: the shipped one); option `long_side_px`."""
+    """`mv_weights` is a safetensors file (default: the shipped one); options `long_side_px` and
+    `warp` (false withholds the references' warped light: an ablation)."""
     net = load_network(_path(settings.mv_weights, "mv"), "mv")
-    return SmallHarmonizer(net, _long_side(settings))
+    return SmallHarmonizer(net, _long_side(settings), bool(settings.options.get("warp", True)))
 
 
 def _path(weights: str | None, kind: str) -> Path:
@@ -34,9 +35,11 @@ def _path(weights: str | None, kind: str) -> Path:
 
 
 def _long_side(settings: BackendSettings) -> int:
-    unknown = sorted(set(settings.options) - {"long_side_px"})
+    unknown = sorted(set(settings.options) - {"long_side_px", "warp"})
     if unknown:
-        raise InputError(f"the small backend has no option {unknown[0]}; it has long_side_px.")
+        raise InputError(
+            f"the small backend has no option {unknown[0]}; it has long_side_px and warp."
+        )
     value = settings.options.get("long_side_px", LONG_SIDE_PX)
     low, high = LONG_SIDE_RANGE
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:

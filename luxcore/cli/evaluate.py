@@ -1,0 +1,81 @@
+"""`lux evaluate`: the tables of scores on a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command("evaluate")
+@click.option(
+    "--dataset",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Rendered rooms with known light, in the compact form or the public layout.",
+)
+@click.option(
+    "--out",
+    default=Path("evaluation"),
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Folder to write.",
+)
+@click.option(
+    "--cases",
+    default=112,
+    show_default=True,
+    type=click.IntRange(1),
+    help="(room, lamp) cases with the lamp on, and again off.",
+)
+@click.option(
+    "--groups",
+    default=30,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Groups of views for the multi-view table.",
+)
+@click.option(
+    "--size",
+    default=128,
+    show_default=True,
+    type=click.IntRange(32, 1024),
+    help="Side of a photo in pixels.",
+)
+@click.option("--sv-weights", default=None, type=click.Path(path_type=Path))
+@click.option("--mv-weights", default=None, type=click.Path(path_type=Path))
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
+def command(
+    dataset: Path,
+    out: Path,
+    cases: int,
+    groups: int,
+    size: int,
+    sv_weights: Path | None,
+    mv_weights: Path | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Score the models on DATASET and print both tables, in the paper's form."""
+    from luxcore.evaluate.dataset import evaluation_views
+    from luxcore.evaluate.run import evaluate_models
+    from luxcore.settings.evaluate import EvaluateSettings
+
+    settings = EvaluateSettings(cases=cases, groups=groups, size_px=size)
+    metrics = evaluate_models(
+        evaluation_views(dataset),
+        [],
+        out,
+        settings,
+        sv_weights=sv_weights,
+        mv_weights=mv_weights,
+        seed=seed,
+    )
+    if as_json:
+        import json
+
+        click.echo(json.dumps(metrics))
+        return
+    for table in sorted((out / "tables").glob("*.md")):
+        click.echo(table.read_text(encoding="utf-8"))

@@ -1,0 +1,138 @@
+"""What `lux decompose` does: files in, files out, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from luxcore.decompose.burning import burning_lamps
+from luxcore.decompose.photo import PhotoLight, decompose_photo
+from luxcore.decompose.store import write_light
+from luxcore.errors import InputError
+from luxcore.files.atomic import atomic_folder
+from luxcore.files.exr import read_exr_image
+from luxcore.files.photos import read_mask, read_photo, write_png
+from luxcore.light.agx import agx, agx_inverse
+from luxcore.models.backends import open_decomposer
+from luxcore.models.interface import BackendSettings
+
+MIN_SIDE_PX = 16
+BRACKETS_EV = (0, 2, 4)
+
+
+def decompose_file(
+    photo_path: Path,
+    mask_paths: Sequence[Path],
+    off_paths: Sequence[Path],
+    out: Path,
+    backend: str,
+    settings: BackendSettings,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Decompose a photo file (or a linear EXR) into the folder `out`; see `lux decompose`.
+
+    Raises InputError or FormatError for files that cannot be used; `out` is then left as it was.
+    """
+    shown, linear = _read(photo_path)
+    masks, names, off = _masks(shown, mask_paths, off_paths)
+    on = burning_lamps(linear, masks) & ~off
+    result = decompose_photo(linear, masks, open_decomposer(backend, settings), on=on, seed=seed)
+    with atomic_folder(out) as folder:
+        _write(folder, shown, result, names)
+    return {
+        "out": str(out),
+        "recomposition_db": round(result.recomposition_db, 2),
+        "lamps": [
+            {"name": name, "on": bool(lit), "scale": scale}
+            for name, lit, scale in zip(
+                names, result.on, result.light.scale.astype(float).tolist(), strict=True
+            )
+        ],
+    }
+
+
+def parse_options(texts: Sequence[str]) -> dict[str, str | int | float | bool]:
+    """NAME=VALUE texts as options; numbers, true and false are taken as such."""
+    options: dict[str, str | int | float | bool] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise InputError(f"an option must look like NAME=VALUE, got {text!r:.80}.")
+        options[name] = _plain(value)
+    return options
+
+
+def _plain(value: str) -> str | int | float | bool:
+    if value.lower() in ("true", "false"):
+        return value.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(value)
+        except ValueError:
+            continue
+    return value
+
+
+def _read(path: Path) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w 3"]]:
+    """The photo as displayed and in linear light where the exposure is 1."""
+    if path.suffix.lower() == ".exr":
+        linear = np.maximum(read_exr_image(path), 0)
+        shown = np.asarray(agx(linear), np.float32)
+    else:
+        shown = read_photo(path)
+        linear = np.asarray(agx_inverse(shown), np.float32)
+    height, width = shown.shape[:2]
+    if min(height, width) < MIN_SIDE_PX:
+        raise InputError(f"{path} is {width}x{height}; {MIN_SIDE_PX} pixels a side are the least.")
+    return shown, linear
+
+
+def _masks(
+    shown: Float[np.ndarray, "h w 3"], mask_paths: Sequence[Path], off_paths: Sequence[Path]
+) -> tuple[Bool[np.ndarray, "k h w"], list[str], Bool[np.ndarray, " k"]]:
+    """All masks in order, their names, and which lamps the user calls off."""
+    height, width = shown.shape[:2]
+    paths = [*mask_paths, *off_paths]
+    if not paths:
+        from luxcore.masks.single import propose_photo
+
+        found = propose_photo(shown)
+        return np.stack(found), [f"lamp_{k}" for k in range(len(found))], np.zeros(len(found), bool)
+    masks = np.stack([read_mask(path, (height, width)) for path in paths])
+    _check_overlap(paths, masks)
+    off = np.arange(len(paths)) >= len(mask_paths)
+    return masks, [path.stem for path in paths], off
+
+
+def _check_overlap(paths: Sequence[Path], masks: Bool[np.ndarray, "k h w"]) -> None:
+    """Masks that touch are fine (the first owns the shared pixels); one lamp given twice is not."""
+    for second in range(len(masks)):
+        for first in range(second):
+            shared = int((masks[first] & masks[second]).sum())
+            if shared > 0.5 * min(int(masks[first].sum()), int(masks[second].sum())):
+                raise InputError(
+                    f"{paths[second]} and {paths[first]} overlap by more than half: "
+                    "give each lamp its own mask."
+                )
+
+
+def _write(
+    folder: Path, shown: Float[np.ndarray, "h w 3"], result: PhotoLight, names: Sequence[str]
+) -> None:
+    from luxcore.explorer import write_explorer
+
+    light = result.light
+    write_light(folder, result, names, 1.0, np.ones(len(names), bool))
+    for k, lamp in enumerate(light.contributions()):
+        for stops in BRACKETS_EV:
+            picture = agx(lamp * np.float32(2.0**-stops))
+            write_png(folder / "pictures" / f"light_{k:02d}_ev{stops}.png", picture)
+        if result.on[k]:
+            write_png(folder / "pictures" / f"without_{k:02d}.png", agx(light.one_light_off(k)))
+    write_explorer(
+        folder / "blend.html", shown, light.ambient, light.olat, light.scale, list(names), 1.0
+    )

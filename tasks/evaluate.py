@@ -1,0 +1,27 @@
+"""Stage evaluate: decomposition and harmonization against truth."""
+
+from __future__ import annotations
+
+from luxcore.data.compact import list_rendered
+from luxcore.evaluate.run import evaluate_models
+from tasks.context import StageContext
+
+
+def run(stage: StageContext) -> None:
+    """Both tables on the rendered test rooms and on every capture with truth."""
+    captures = [
+        (stage.input("capture") / capture, stage.input("masks") / capture)
+        for capture in stage.captures
+    ]
+    metrics = evaluate_models(
+        list_rendered(stage.input("render") / "test"),
+        captures,
+        stage.out,
+        stage.settings,
+        sv_weights=stage.input("train_sv") / "model.safetensors",
+        mv_weights=stage.input("train_mv") / "model.safetensors",
+        seed=stage.seed,
+    )
+    stage.log_metrics(metrics)
+    for picture in sorted((stage.out / "pictures").glob("*.png")):
+        stage.log_picture(picture.stem, picture)
