@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.capture.colmap_files import find_model, read_model
-from luxcore.capture.names import inside
+from luxcore.capture.names import check_id, inside
 from luxcore.capture.nerfstudio import read_nerfstudio
 from luxcore.capture.orientation import room_like
 from luxcore.capture.photo_folder import StagedPhoto, find_photos, stage_photos
@@ -23,23 +23,32 @@ from luxcore.files.atomic import atomic_folder
 from luxcore.settings.capture import CaptureSettings
 
 
-def ingest(source: Path, out: Path, settings: CaptureSettings, seed: int) -> Capture:
-    """Write the capture `out` (its name is the id) from `source`, whole or not at all.
+def ingest(
+    source: Path,
+    out: Path,
+    settings: CaptureSettings,
+    seed: int,
+    *,
+    capture_id: str | None = None,
+) -> Capture:
+    """Write the capture `out` from `source`, whole or not at all.
 
-    `source` is a capture, a nerfstudio folder, a COLMAP project, or a folder of photos.
+    `source` is a capture, a nerfstudio folder, a COLMAP project, or a folder of photos. The id is
+    the name of `out` unless given; a capture that is copied keeps its own.
     Raises InputError for what cannot be used, LuxError when too few views can be placed.
     """
     source, out = Path(source), Path(out)
+    identifier = check_id(out.name if capture_id is None else capture_id)
     if not source.is_dir():
         raise InputError(f"{source} is not a folder.")
     if (source / "capture.json").is_file():
         return _copy(source, out)
     if (source / "transforms.json").is_file():
-        return _from_nerfstudio(source, out, settings)
+        return _from_nerfstudio(source, out, identifier, settings)
     model = find_model(source)
     if model is not None:
-        return _from_colmap(source, model, out, settings)
-    return _from_photos(source, out, settings, seed)
+        return _from_colmap(source, model, out, identifier, settings)
+    return _from_photos(source, out, identifier, settings, seed)
 
 
 def placed_sentence(capture: Capture) -> str:
@@ -58,20 +67,26 @@ def _copy(source: Path, out: Path) -> Capture:
     return load_capture(out)
 
 
-def _from_nerfstudio(source: Path, out: Path, settings: CaptureSettings) -> Capture:
+def _from_nerfstudio(
+    source: Path, out: Path, identifier: str, settings: CaptureSettings
+) -> Capture:
     photos, points = read_nerfstudio(source / "transforms.json")
     views = to_views(photos, settings.image_side)
-    return write_capture(out, out.name, views, points, source="nerfstudio", metric=False)
+    return write_capture(out, identifier, views, points, source="nerfstudio", metric=False)
 
 
-def _from_colmap(source: Path, model: Path, out: Path, settings: CaptureSettings) -> Capture:
+def _from_colmap(
+    source: Path, model: Path, out: Path, identifier: str, settings: CaptureSettings
+) -> Capture:
     root = next(f for f in (source / "images", source) if f.is_dir())
     sparse = read_model(model, root)
     files = {image.name: inside(root, image.name, model) for image in sparse.images}
-    return _write(sparse, files, {}, out, settings, "colmap", [])
+    return _write(sparse, files, {}, out, identifier, settings, "colmap", [])
 
 
-def _from_photos(source: Path, out: Path, settings: CaptureSettings, seed: int) -> Capture:
+def _from_photos(
+    source: Path, out: Path, identifier: str, settings: CaptureSettings, seed: int
+) -> Capture:
     photos = find_photos(source)
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
@@ -84,7 +99,7 @@ def _from_photos(source: Path, out: Path, settings: CaptureSettings, seed: int) 
         skipped += [Skipped(p.name, "could not be placed") for p in unplaced]
         files = {p.path.name: p.path for p in staged}
         names = {p.path.name: p.name for p in staged}
-        return _write(sparse, files, names, out, settings, "photos", skipped)
+        return _write(sparse, files, names, out, identifier, settings, "photos", skipped)
 
 
 def _check_enough(
@@ -104,6 +119,7 @@ def _write(
     files: dict[str, Path],
     names: dict[str, str],
     out: Path,
+    identifier: str,
     settings: CaptureSettings,
     source: str,
     skipped: list[Skipped],
@@ -118,7 +134,7 @@ def _write(
     ]
     return write_capture(
         out,
-        out.name,
+        identifier,
         to_views(photos, settings.image_side),
         Points(xyz, sparse.points.rgb),
         source=source,

@@ -26,7 +26,13 @@ from luxcore.settings.capture import CaptureSettings
 Layers = dict[str, np.ndarray]
 
 
-def from_rendered(render_demo_dir: Path, out: Path, settings: CaptureSettings) -> Capture:
+def from_rendered(
+    render_demo_dir: Path,
+    out: Path,
+    settings: CaptureSettings,
+    *,
+    capture_id: str | None = None,
+) -> Capture:
     """Make a capture with truth of the perspective views in `render_demo_dir`/views.
 
     Raises InputError when there are none, FormatError when a view is incomplete.
@@ -40,7 +46,7 @@ def from_rendered(render_demo_dir: Path, out: Path, settings: CaptureSettings) -
     photos = [_photo(path, exposure) for path in views]
     return write_capture(
         out,
-        Path(out).name,
+        Path(out).name if capture_id is None else capture_id,
         photos,
         _points(views, photos, settings.points),
         source="rendered",
