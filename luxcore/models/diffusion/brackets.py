@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from luxcore.data.lighting import BRACKETS_EV
 from luxcore.light.agx import agx
+from luxcore.light.hdr import merge_brackets
 
 LIT_PERCENTILE = 90.0
 LIT_RADIANCE = 0.7
@@ -34,3 +36,14 @@ def olat_picture(
 ) -> Float[np.ndarray, "h w 3"]:
     """The bracket AgX(2^ev · g · I), display-referred in 0..1."""
     return agx((light * (exposure * 2.0**exposure_ev)).astype(np.float32))
+
+
+def merged_light(
+    pictures: Sequence[Float[np.ndarray, "h w 3"]], exposure: float = 1.0
+) -> Float[np.ndarray, "h w 3"]:
+    """Linear light of a model's pictures at BRACKETS_EV (Debevec's merge), the inverse of
+    `olat_picture`.
+
+    What a model paints may lie outside of Rec.709, where one channel is negative: it becomes 0.
+    """
+    return np.maximum(merge_brackets(pictures, BRACKETS_EV, exposure=exposure).radiance, 0)

@@ -54,10 +54,13 @@ class Examples(Protocol):
 class Trainee(Protocol):
     """A model that the loop can train."""
 
-    module: nn.Module
-    """Its forward takes the tensors of `batch` by name and returns one loss per example, [b]."""
+    @property
+    def module(self) -> nn.Module:
+        """Its forward takes the tensors of `batch` by name and returns a loss per example, [b]."""
+        ...
 
-    examples: Examples
+    @property
+    def examples(self) -> Examples: ...
 
     def optimizer(self, parameters: Sequence[nn.Parameter]) -> Optimizer: ...
 

@@ -30,8 +30,8 @@ def widen_input(unet: UNet2DConditionModel, channels: int) -> None:
         channels, old.out_channels, old.kernel_size, old.stride, old.padding, dtype=old.weight.dtype
     )
     with torch.no_grad():
-        new.weight.zero_()
+        nn.init.zeros_(new.weight)
         new.weight[:, : old.in_channels] = old.weight
-        new.bias.copy_(old.bias)
+    new.bias = old.bias
     unet.conv_in = new.to(old.weight.device)
     unet.register_to_config(in_channels=channels)

@@ -24,17 +24,23 @@ from luxcore.models.flux_kontext.transformer import KontextModule
 from luxcore.settings.paper_models import KontextSampling, KontextSettings
 
 if TYPE_CHECKING:
-    from diffusers import AutoencoderKL, FlowMatchEulerDiscreteScheduler
+    from diffusers import AutoencoderKL, FlowMatchEulerDiscreteScheduler, FluxKontextPipeline
 
 
 @runtime_checkable
 class Editor(Protocol):
     """A single-view model, ready to train or to edit."""
 
-    module: KontextModule | LatentUNetModule
-    vae: AutoencoderKL
-    multiple: int
-    """Sides of a picture are multiples of this."""
+    @property
+    def module(self) -> KontextModule | LatentUNetModule: ...
+
+    @property
+    def vae(self) -> AutoencoderKL: ...
+
+    @property
+    def multiple(self) -> int:
+        """Sides of a picture are multiples of this."""
+        ...
 
     def mask_input(self, mask: Float[Tensor, "b 1 h w"]) -> Tensor:
         """The mask as the module takes it."""
@@ -108,7 +114,7 @@ class KontextEditor:
             files["mask.safetensors"] = dict(self.module.mask_tokens.named_parameters())
         return files
 
-    def _pipeline(self) -> object:
+    def _pipeline(self) -> FluxKontextPipeline:
         from diffusers import FluxKontextPipeline
 
         pipeline = FluxKontextPipeline(

@@ -52,7 +52,8 @@ class LatentUNetModule(nn.Module):
         sequence: Float[Tensor, "b t d"],
     ) -> Float[Tensor, "b c h w"]:
         """The U-Net's answer: noise or v."""
-        covered = functional.adaptive_avg_pool2d(mask, noisy.shape[-2:])
+        size = (noisy.shape[-2], noisy.shape[-1])
+        covered = functional.adaptive_avg_pool2d(mask, size)
         channels = torch.cat([noisy, condition, covered], dim=1)
         return self.unet(channels, timestep, encoder_hidden_states=sequence, return_dict=False)[0]
 
