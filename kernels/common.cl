@@ -13,6 +13,12 @@
 #ifndef ALPHA_MIN
 #define ALPHA_MIN (1.0f / 255.0f)
 #endif
+#ifndef LOG2_ALPHA_MIN
+#define LOG2_ALPHA_MIN -7.994353437f
+#endif
+#ifndef CHORD_SLACK
+#define CHORD_SLACK 0.01f
+#endif
 #ifndef ALPHA_MAX
 #define ALPHA_MAX 0.99f
 #endif
@@ -34,9 +40,5 @@
 #ifndef COMPENSATION_MIN
 #define COMPENSATION_MIN 0.005f
 #endif
-
-// Gradient slots of one intersection: mean2d x y, conic a b c, opacity, depth, colours.
-#define SLOT_COLOR 7
-#define SLOT_SIZE (SLOT_COLOR + CHANNELS)
 
 #endif

@@ -8,6 +8,7 @@ program = device.program("projection", {"CHANNELS": 3})   # kernels/projection.c
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,10 +19,12 @@ from typing import Any, Literal
 import numpy as np
 import pyopencl as cl
 import pyopencl.array as cla
+from pyopencl.tools import ImmediateAllocator, MemoryPool
 
 from luxcore.errors import DeviceError
 
 KERNEL_FOLDER = Path(__file__).parents[2] / "kernels"
+DEFAULT_GROUP = 64
 PLATFORM_VARIABLE = "LUX_OPENCL_PLATFORM"
 
 PixelMapping = Literal["block", "pixel"]
@@ -51,6 +54,8 @@ class Device:
     context: cl.Context
     queue: cl.CommandQueue
     mapping: PixelMapping
+    pool: MemoryPool
+    """Freed arrays are kept and handed out again: fresh pages cost more than the kernels."""
     _programs: dict[tuple[Any, ...], Kernels] = field(default_factory=dict, repr=False)
 
     @property
@@ -62,15 +67,15 @@ class Device:
 
     def array(self, values: np.ndarray) -> cla.Array:
         """A copy of `values` on the device, C order, dtype kept."""
-        return cla.to_device(self.queue, np.ascontiguousarray(values))
+        return cla.to_device(self.queue, np.ascontiguousarray(values), allocator=self.pool)
 
     def zeros(self, shape: tuple[int, ...], dtype: Any = np.float32) -> cla.Array:
         """An array of zeros on the device."""
-        return cla.zeros(self.queue, shape, dtype)
+        return cla.zeros(self.queue, shape, dtype, allocator=self.pool)
 
     def empty(self, shape: tuple[int, ...], dtype: Any = np.float32) -> cla.Array:
         """An array on the device whose contents are undefined."""
-        return cla.empty(self.queue, shape, dtype)
+        return cla.empty(self.queue, shape, dtype, allocator=self.pool)
 
     def program(self, name: str, defines: Defines | None = None) -> Kernels:
         """The kernels of `kernels/<name>.cl` with each define passed as -D; built once per set.
@@ -84,15 +89,27 @@ class Device:
         return self._programs[key]
 
     def launch(
-        self, kernel: cl.Kernel, work_items: int, *arguments: Any, group: int | None = None
+        self,
+        kernel: cl.Kernel,
+        work_items: int | tuple[int, ...],
+        *arguments: Any,
+        group: int | None = None,
     ) -> None:
         """Enqueues `kernel` over `work_items`; nothing happens for zero of them.
 
+        With `group`, work-groups have that size along the first axis and the number of work-items
+        is rounded up to a multiple of it: the kernel must return for the ones beyond its count.
+        Without it, the largest power of two up to 64 that divides the number. Never the driver's
+        choice: PoCL compiles a kernel again for every size of work-group it meets.
         An int becomes int32, a float becomes float32, None and an empty array a null pointer.
         """
-        if work_items:
-            local = None if group is None else (group,)
-            kernel(self.queue, (work_items,), local, *(_argument(a) for a in arguments))
+        items = (work_items,) if isinstance(work_items, int) else work_items
+        if not all(items):
+            return
+        size = group or math.gcd(items[0], DEFAULT_GROUP)
+        rounded = (-(-items[0] // size) * size, *items[1:])
+        local = (size, *(1 for _ in items[1:]))
+        kernel(self.queue, rounded, local, *(_argument(a) for a in arguments))
 
     def _build(self, name: str, options: tuple[tuple[str, str], ...]) -> Kernels:
         path = KERNEL_FOLDER / f"{name}.cl"
@@ -137,7 +154,9 @@ def _open(wanted: str, mapping: PixelMapping | None) -> Device:
     device = _choose(wanted)
     context = cl.Context([device])
     is_gpu = bool(device.type & cl.device_type.GPU)
-    return Device(context, cl.CommandQueue(context), mapping or ("pixel" if is_gpu else "block"))
+    queue = cl.CommandQueue(context)
+    pool = MemoryPool(ImmediateAllocator(queue))
+    return Device(context, queue, mapping or ("pixel" if is_gpu else "block"), pool)
 
 
 def _choose(wanted: str) -> cl.Device:

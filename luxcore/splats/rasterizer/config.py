@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 TILE = 16
@@ -14,6 +15,10 @@ TRANSMITTANCE_MIN = (1.0 - ALPHA_MAX) ** 2
 """A pixel is finished before the Gaussian that would bring its transmittance below this."""
 COMPENSATION_MIN = 0.005
 """Floor of the low-pass compensation factor, so that thin Gaussians do not vanish."""
+CHORD_SLACK = 0.01
+"""px by which the bounds of an ellipse are widened, so that rounding cannot lose a pixel."""
+MOMENTS = 6
+"""Sums over pixels that carry the gradient of a projected Gaussian, before its colours."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +47,17 @@ class RasterConfig:
         return {
             "TILE": TILE,
             "ALPHA_MIN": ALPHA_MIN,
+            "LOG2_ALPHA_MIN": math.log2(ALPHA_MIN),
             "ALPHA_MAX": ALPHA_MAX,
             "TRANSMITTANCE_MIN": TRANSMITTANCE_MIN,
             "COMPENSATION_MIN": COMPENSATION_MIN,
+            "CHORD_SLACK": CHORD_SLACK,
             "CHANNELS": self.channels,
             "ANTIALIASED": self.antialiased,
             "NEAR_M": self.near,
             "EPS2D": self.eps2d,
         }
+
+    def slot_size(self, with_depth: bool) -> int:
+        """Floats of one gradient slot: moments, colours and depth, rounded up to whole float4."""
+        return -(-(MOMENTS + self.channels + with_depth) // 4) * 4

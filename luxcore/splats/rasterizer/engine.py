@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pyopencl.array as cla
 
 from luxcore.cameras import Camera
 from luxcore.splats.device import Device
-from luxcore.splats.rasterizer.config import TILE, RasterConfig
-from luxcore.splats.rasterizer.output import GaussianArrays, RasterGradients, RasterOutput
+from luxcore.splats.rasterizer.binning import Binning
+from luxcore.splats.rasterizer.blending import Blending
+from luxcore.splats.rasterizer.config import RasterConfig
+from luxcore.splats.rasterizer.output import (
+    GaussianArrays,
+    RasterGradients,
+    RasterOutput,
+    SavedForBackward,
+)
 
-
-@dataclass(frozen=True, eq=False)
-class Saved:
-    """What blending read, kept for the backward pass."""
-
-    records: cla.Array
-    ranges: cla.Array
-    sorted_ids: cla.Array
-    sorted_slots: cla.Array
-    offsets: cla.Array
-    counts: cla.Array
+GROUP = 64
 
 
 class Rasterizer:
@@ -30,9 +25,10 @@ class Rasterizer:
 
     def __init__(self, device: Device, config: RasterConfig) -> None:
         self.device, self.config = device, config
-        defines = config.defines()
-        self._projection = device.program("projection", defines)
-        self._raster = device.program("raster_block", defines)
+        self._projection = device.program("projection", config.defines())
+        self._projection_backward = device.program("projection_backward", config.defines())
+        self._binning = Binning(device, config)
+        self._blending = Blending(device, config)
 
     def forward(
         self,
@@ -47,22 +43,16 @@ class Rasterizer:
         inputs = GaussianArrays(means, quats, log_scales, opacity_logits, colors)
         self._check(inputs)
         device, n = self.device, inputs.count
-        height, width = camera.height, camera.width
-        records, rects = device.zeros((n, 8)), device.zeros((n, 4), np.int32)
-        radii = device.zeros((n,), np.int32)
+        records, radii = device.empty((n, 8)), device.empty((n,), np.int32)
+        depth_keys, tile_counts = device.empty((n,), np.uint32), device.empty((n,), np.int32)
         device.launch(
             self._projection.project_gaussians, n, n, *_camera_arguments(camera), means, quats,
-            log_scales, opacity_logits, records, rects, radii,
+            log_scales, opacity_logits, records, depth_keys, tile_counts, radii, group=GROUP,
         )  # fmt: skip
-        saved, total = self._bin(camera, records, rects)
-        image = device.empty((height, width, self.config.channels))
-        alpha, depth = device.empty((height, width)), device.empty((height, width))
-        tiles_x, tiles = _tiles(camera)
-        device.launch(
-            self._raster.raster_forward, tiles, _size(camera), tiles_x, saved.ranges,
-            saved.sorted_ids, records, colors, image, alpha, depth, group=1,
-        )  # fmt: skip
-        return RasterOutput(image, alpha, depth, radii, total, camera, inputs, saved)
+        lists = self._binning(camera, records, depth_keys, tile_counts)
+        image, alpha, depth, used = self._blending.forward(camera, lists, records, colors)
+        saved = SavedForBackward(records, lists, used)
+        return RasterOutput(image, alpha, depth, radii, camera, inputs, saved)
 
     def backward(
         self,
@@ -72,61 +62,35 @@ class Rasterizer:
         d_depth: cla.Array | None = None,
     ) -> RasterGradients:
         """Gradients of a loss whose derivatives by `out.image`, `.alpha`, `.depth` are given."""
-        device, inputs, saved = self.device, out.inputs, out.saved
-        n, channels, camera = inputs.count, self.config.channels, out.camera
-        slots = device.empty((max(out.intersections, 1), 7 + channels))
-        d_alpha = d_alpha if d_alpha is not None else device.zeros(out.alpha.shape)
-        d_depth = d_depth if d_depth is not None else device.zeros(out.depth.shape)
-        grads = RasterGradients(
-            device.empty((n, 3)), device.empty((n, 4)), device.empty((n, 3)), device.empty((n,)),
-            device.empty((n, channels)), device.empty((n,)),
-            (out.radii > 0).astype(np.uint8) if n else device.empty((0,), np.uint8),
-        )  # fmt: skip
-        tiles_x, tiles = _tiles(camera)
+        device, inputs, n = self.device, out.inputs, out.inputs.count
+        moments, d_colors = self._blending.backward(out, d_image, d_alpha, d_depth)
+        gradients = RasterGradients(
+            means=device.empty((n, 3)),
+            quats=device.empty((n, 4)),
+            log_scales=device.empty((n, 3)),
+            opacity_logits=device.empty((n,)),
+            colors=d_colors,
+            mean2d_norm=device.empty((n,)),
+            visible=device.empty((n,), np.uint8),
+        )
         device.launch(
-            self._raster.raster_backward, tiles, _size(camera), tiles_x, saved.ranges,
-            saved.sorted_ids, saved.sorted_slots, saved.records, inputs.colors, out.image,
-            out.alpha, out.depth, d_image, d_alpha, d_depth, slots, group=1,
+            self._projection_backward.project_gaussians_backward, n, n,
+            *_camera_arguments(out.camera), inputs.means, inputs.quats, inputs.log_scales,
+            inputs.opacity_logits, out.radii, moments, gradients.means, gradients.quats,
+            gradients.log_scales, gradients.opacity_logits, gradients.mean2d_norm,
+            gradients.visible, group=GROUP,
         )  # fmt: skip
-        d_records = device.empty((n, 8))
-        device.launch(
-            self._raster.reduce_slots, n, n, saved.offsets, saved.counts, slots, d_records,
-            grads.colors,
-        )  # fmt: skip
-        device.launch(
-            self._projection.project_gaussians_backward, n, n, *_camera_arguments(camera),
-            inputs.means, inputs.quats, inputs.log_scales, inputs.opacity_logits, out.radii,
-            d_records, grads.means, grads.quats, grads.log_scales, grads.opacity_logits,
-            grads.mean2d_norm,
-        )  # fmt: skip
-        return grads
-
-    def _bin(self, camera: Camera, records: cla.Array, rects: cla.Array) -> tuple[Saved, int]:
-        device = self.device
-        tiles_x, tiles = _tiles(camera)
-        host_rects, depth = rects.get(), records.get()[:, 6]
-        spans = np.maximum(host_rects[:, 2:] - host_rects[:, :2], 0)
-        counts = spans[:, 0] * spans[:, 1]
-        offsets = np.cumsum(counts) - counts
-        total = int(counts.sum())
-        ids = np.repeat(np.arange(len(counts)), counts)
-        inner = np.arange(total) - offsets[ids]
-        tile = (host_rects[ids, 1] + inner // np.maximum(spans[ids, 0], 1)) * tiles_x
-        tile += host_rects[ids, 0] + inner % np.maximum(spans[ids, 0], 1)
-        order = np.lexsort((ids, depth[ids], tile))
-        bounds = np.searchsorted(tile[order], np.arange(tiles + 1))
-        ranges = np.stack([bounds[:-1], bounds[1:]], 1)
-        padded = order if total else np.zeros(1, np.int64)
-        sorted_ids = ids[order] if total else padded
-        as_device = [a.astype(np.int32) for a in (ranges, sorted_ids, padded, offsets, counts)]
-        return Saved(records, *(device.array(a) for a in as_device)), total
+        return gradients
 
     def _check(self, inputs: GaussianArrays) -> None:
         n = inputs.count
         expected = {
-            "means": (n, 3), "quats": (n, 4), "log_scales": (n, 3), "opacity_logits": (n,),
+            "means": (n, 3),
+            "quats": (n, 4),
+            "log_scales": (n, 3),
+            "opacity_logits": (n,),
             "colors": (n, self.config.channels),
-        }  # fmt: skip
+        }
         for name, shape in expected.items():
             array = getattr(inputs, name)
             if array.shape != shape or array.dtype != np.float32:
@@ -135,16 +99,7 @@ class Rasterizer:
                 )
 
 
-def _tiles(camera: Camera) -> tuple[int, int]:
-    tiles_x, tiles_y = -(-camera.width // TILE), -(-camera.height // TILE)
-    return tiles_x, tiles_x * tiles_y
-
-
-def _size(camera: Camera) -> np.ndarray:
-    return np.array([camera.width, camera.height], np.int32)
-
-
 def _camera_arguments(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     view = camera.viewmat.astype(np.float32).reshape(16)
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-    return view, intrinsics, _size(camera)
+    return view, intrinsics, np.array([camera.width, camera.height], np.int32)

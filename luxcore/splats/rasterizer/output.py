@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import pyopencl.array as cla
 
 from luxcore.cameras import Camera
+from luxcore.splats.rasterizer.binning import TileLists
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,27 @@ class GaussianArrays:
 
 
 @dataclass(frozen=True, eq=False)
+class SavedForBackward:
+    """What blending read."""
+
+    records: cla.Array
+    """[n, 8] projected Gaussians, laid out as kernels/blending.cl says."""
+    lists: TileLists
+    used: cla.Array
+    """[tiles] Gaussians looked at before a tile's pixels were finished."""
+
+    @property
+    def ranges(self) -> cla.Array:
+        """[tiles, 2] positions of each tile in `sorted_ids`."""
+        return self.lists.ranges
+
+    @property
+    def sorted_ids(self) -> cla.Array:
+        """[pairs] Gaussians, tile by tile, nearest first."""
+        return self.lists.sorted_ids
+
+
+@dataclass(frozen=True, eq=False)
 class RasterOutput:
     """Images of one view; see the package docstring for shapes."""
 
@@ -34,12 +55,14 @@ class RasterOutput:
     alpha: cla.Array
     depth: cla.Array
     radii: cla.Array
-    intersections: int
-    """(Gaussian, tile) pairs that were drawn."""
     camera: Camera
     inputs: GaussianArrays
-    saved: Any
-    """Projected records and the sorted lists, for `Rasterizer.backward` alone."""
+    saved: SavedForBackward
+
+    @property
+    def intersections(self) -> int:
+        """(Gaussian, tile) pairs of the view."""
+        return self.saved.lists.pairs
 
 
 @dataclass(frozen=True, eq=False)

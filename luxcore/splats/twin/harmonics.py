@@ -29,7 +29,7 @@ def basis(direction: Float[Tensor, "n 3"], degree: int) -> Float[Tensor, "n k"]:
     if degree > 0:
         rows += [k * v for k, v in zip(_BAND_1, (y, z, x), strict=True)]
     if degree > 1:
-        band = (x * y, y * z, 2 * zz - xx - yy, x * z, xx - yy)
+        band: tuple[Tensor, ...] = (x * y, y * z, 2 * zz - xx - yy, x * z, xx - yy)
         rows += [k * v for k, v in zip(_BAND_2, band, strict=True)]
     if degree > 2:
         band = (

@@ -1,0 +1,141 @@
+// Derivative of the blending, one work-item per 16x16 tile: the mapping for CPUs.
+//
+// Front to back again, with the same alphas. With s_i = f_i . d_features + d_alpha and
+// R_i = sum_{j>i} w_j s_j, known from the forward image,
+//   h_i = dL/d ln(alpha_i) = w_i s_i - R_i alpha_i / (1 - alpha_i),
+// so nothing divides the transmittance back. Each (Gaussian, tile) pair writes its own slot:
+// the moments of h (see projection_backward.cl), then dL/d features. No atomics.
+// touched[slot] must be 0 before; slots of Gaussians behind finished pixels stay untouched.
+// Compile-time: CHANNELS, WITH_DEPTH, SLOT_SIZE, CHUNK and the constants of blending.cl.
+#define FEATURES (CHANNELS + WITH_DEPTH)
+#define MOMENTS 6
+#define SUMS (MOMENTS + FEATURES)
+#define SUM_VECTORS ((SUMS + 15) / 16)
+#include "block_chunk.cl"
+#line 17 "raster_block_backward.cl"
+
+typedef struct {
+  float16 T;     // 0 once the pixel is finished
+  float16 rest;  // R of the next Gaussian, before it is blended
+  float16 d_alpha;
+  float16 d_features[FEATURES];
+} Block;
+
+inline float16 fold(const float16 a, const float16 b) {
+  return (float16)(a.even + a.odd, b.even + b.odd);
+}
+
+// Lane i: the sum of the lanes of v[i], always in the same order.
+inline float16 sum_lanes(const float16 *v) {
+  const float16 a = fold(fold(v[0], v[1]), fold(v[2], v[3]));
+  const float16 b = fold(fold(v[4], v[5]), fold(v[6], v[7]));
+  const float16 c = fold(fold(v[8], v[9]), fold(v[10], v[11]));
+  const float16 d = fold(fold(v[12], v[13]), fold(v[14], v[15]));
+  return fold(fold(a, b), fold(c, d));
+}
+
+inline void blend_backward(Block *block, const float8 r, const float *features, const float16 px,
+                           const float16 py, float16 *sums) {
+  const float16 dx = RECORD_X(r) - px, dy = RECORD_Y(r) - py;
+  const float16 p = log2_alpha_block(r, dx, dy);
+  const float16 alpha = alpha_block(p);
+  const float16 T = block->T, after = fma(-alpha, T, T);
+  const int16 drawn = after >= TRANSMITTANCE_MIN;
+  const float16 weight = drawn ? alpha * T : (float16)(0.0f);
+  block->T = drawn ? after : (float16)(0.0f);
+  float16 s = block->d_alpha;
+#pragma unroll
+  for (int k = 0; k < FEATURES; ++k) {
+    s = fma((float16)(features[k]), block->d_features[k], s);
+    sums[MOMENTS + k] = fma(weight, block->d_features[k], sums[MOMENTS + k]);
+  }
+  const float16 own = weight * s;
+  block->rest -= own;
+  const float16 slope = own - block->rest * (alpha / (1.0f - alpha));
+  // Where alpha is at its ceiling it does not move with the Gaussian.
+  const float16 h = drawn && alpha < ALPHA_MAX ? slope : (float16)(0.0f);
+  const float16 hx = h * dx, hy = h * dy;
+  sums[0] += h;
+  sums[1] += hx;
+  sums[2] += hy;
+  sums[3] = fma(hx, dx, sums[3]);
+  sums[4] = fma(hx, dy, sums[4]);
+  sums[5] = fma(hy, dy, sums[5]);
+}
+
+// Lanes outside the image start finished, with zero gradients.
+void read_block(Block *block, const int x0, const int y0, const int2 size,
+                __global const float *image, __global const float *alpha,
+                __global const float *depth, __global const float *d_image,
+                __global const float *d_alpha, __global const float *d_depth) {
+  float d_features[FEATURES][16], d_alphas[16], rest[16], T[16];
+  for (int lane = 0; lane < 16; ++lane) {
+    const int x = x0 + (lane & 3), y = y0 + (lane >> 2);
+    const int inside = x < size.x && y < size.y;
+    const size_t pixel = inside ? (size_t)y * size.x + x : 0;
+    const float d_a = inside && d_alpha ? d_alpha[pixel] : 0.0f;
+    float sum = d_a * alpha[pixel];
+    for (int k = 0; k < CHANNELS; ++k) {
+      const float d = inside ? d_image[pixel * CHANNELS + k] : 0.0f;
+      d_features[k][lane] = d;
+      sum = fma(d, image[pixel * CHANNELS + k], sum);
+    }
+#if WITH_DEPTH
+    d_features[CHANNELS][lane] = inside ? d_depth[pixel] : 0.0f;
+    sum = fma(d_features[CHANNELS][lane], depth[pixel], sum);
+#endif
+    d_alphas[lane] = d_a;
+    rest[lane] = sum;
+    T[lane] = inside ? 1.0f : 0.0f;
+  }
+  block->T = vload16(0, T);
+  block->rest = vload16(0, rest);
+  block->d_alpha = vload16(0, d_alphas);
+  for (int k = 0; k < FEATURES; ++k) block->d_features[k] = vload16(0, d_features[k]);
+}
+
+__kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
+    const int2 size, const int tiles_x, __global const int2 *ranges,
+    __global const int *sorted_ids, __global const int *sorted_slots,
+    __global const float *records, __global const float *colors, __global const int *used,
+    __global const float *image, __global const float *alpha, __global const float *depth,
+    __global const float *d_image, __global const float *d_alpha, __global const float *d_depth,
+    __global float *slots, __global uchar *touched) {
+  const int tile = get_global_id(0);
+  const int x0 = (tile % tiles_x) * TILE, y0 = (tile / tiles_x) * TILE;
+  const int end = ranges[tile].x + used[tile];
+  Chunk chunk;
+  Block blocks[BLOCKS];
+  for (int b = 0; b < BLOCKS; ++b)
+    read_block(&blocks[b], x0 + (b & 3) * 4, y0 + (b >> 2) * 4, size, image, alpha, depth, d_image,
+               d_alpha, d_depth);
+  int open = 0xffff;  // bit b: block b has unfinished pixels
+  for (int begin = ranges[tile].x; begin < end; begin += CHUNK) {
+    const int count = min(CHUNK, end - begin);
+    load_chunk(&chunk, begin, count, x0, y0, sorted_ids, records, colors);
+    for (int i = 0; i < count; ++i) {
+      uint left = chunk.blocks[i] & open;
+      if (!left) continue;
+      const float8 r = chunk.record[i];
+      float16 sums[SUM_VECTORS * 16];
+#pragma unroll
+      for (int k = 0; k < SUM_VECTORS * 16; ++k) sums[k] = (float16)(0.0f);
+      for (; left; left &= left - 1) {
+        const int b = popcount(~left & (left - 1));
+        blend_backward(&blocks[b], r, chunk.features + i * FEATURES,
+                       (x0 + (b & 3) * 4 + 0.5f) + LANE_X, (y0 + (b >> 2) * 4 + 0.5f) + LANE_Y,
+                       sums);
+      }
+      const int slot = sorted_slots[begin + i];
+      touched[slot] = 1;
+      float total[SUM_VECTORS * 16];
+#pragma unroll
+      for (int k = 0; k < SUM_VECTORS; ++k) vstore16(sum_lanes(sums + 16 * k), k, total);
+#pragma unroll
+      for (int k = 0; k < SLOT_SIZE / 4; ++k)
+        vstore4(vload4(k, total), 0, slots + (size_t)slot * SLOT_SIZE + 4 * k);
+    }
+    for (int b = 0; b < BLOCKS; ++b)
+      if (!any(blocks[b].T > 0.0f)) open &= ~(1 << b);
+  }
+}
