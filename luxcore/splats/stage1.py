@@ -186,12 +186,15 @@ def _write(
         depth_m = expected_depth(rendered.depth.get(), rendered.alpha.get())
         layers = {"depth_m": depth_m, "normal": normals_from_depth(depth_m, frame.camera)}
         write_exr(out / "depth" / f"{index:04d}.exr", layers, half=False)
-    metrics = {
+    counts = {
         "iterations": fit.done,
         "gaussians": fit.model.count,
         "sh_degree": fit.degree,
         "views": len(fit.views.cameras),
         "views_heldout": len(fit.split.held_out),
+    }
+    metrics = {
+        **{name: float(count) for name, count in counts.items()},
         "psnr_training": float(np.mean(fit.measure(fit.split.training))),
     }
     if fit.split.held_out:

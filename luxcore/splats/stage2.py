@@ -114,7 +114,8 @@ def measure(fit: LightFit, scene: Scene) -> dict[str, float]:
         f"relative_error_{name}": float(value) for name, value in zip(names, errors, strict=True)
     }
     counts = {"gaussians": fit.model.count, "iterations": fit.done, "views": scene.views}
-    return {**metrics, **counts, "views_heldout": len(fit.split.held_out)}
+    counts["views_heldout"] = len(fit.split.held_out)
+    return {**metrics, **{name: float(count) for name, count in counts.items()}}
 
 
 def _prepare(

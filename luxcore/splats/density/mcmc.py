@@ -58,14 +58,17 @@ class McmcStrategy:
     def after_step(
         self, model: DeviceGaussians, out: RasterOutput, gradients: RasterGradients, iteration: int
     ) -> None:
-        """Shake the means, faint Gaussians most, until `stop`."""
-        n, s = model.count, self.settings
-        if iteration < s.stop:
-            self.device.launch(
-                self._kernels.mcmc_noise, n, *model.geometry, n,
-                np.uint32(self._seed & 0xFFFFFFFF), np.uint32(iteration),
-                s.noise_rate * self._means_rate,
-            )  # fmt: skip
+        """Shake the means until `stop`."""
+        if iteration < self.settings.stop:
+            self.shake(model, iteration)
+
+    def shake(self, model: DeviceGaussians, iteration: int) -> None:
+        """Move the means at random within their own shapes, the faint most."""
+        n = model.count
+        self.device.launch(
+            self._kernels.mcmc_noise, n, *model.geometry, n, np.uint32(self._seed & 0xFFFFFFFF),
+            np.uint32(iteration), self.settings.noise_rate * self._means_rate,
+        )  # fmt: skip
 
     def refine(
         self, model: DeviceGaussians, iteration: int, random: np.random.Generator

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -26,6 +26,7 @@ class Edit:
     fresh: Bool[np.ndarray, " n"]
 
 
+@runtime_checkable
 class Strategy(Protocol):
     """Called by the fit at fixed points of each iteration; deterministic given its arguments."""
 
