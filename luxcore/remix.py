@@ -17,7 +17,7 @@ from luxcore.errors import InputError
 from luxcore.files.digests import tree_digest
 from luxcore.harmonize.stage import harmonize_capture
 from luxcore.light.fuse import fuse_capture
-from luxcore.masks.stage import find_lamps
+from luxcore.masks import find_lamps
 from luxcore.settings.base import Settings
 from luxcore.settings.project import ProjectSettings
 from luxcore.splats.stage1 import fit_geometry
