@@ -1,104 +1,96 @@
-"""The compact form of one rendered view: `name.exr`, `.geometry.exr`, `.masks.exr`, `.json`."""
+"""From one render to a `luxcore.data` view: lamps, camera, exposure, and why it was made so."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from luxcore.files.atomic import write_json
-from luxcore.files.exr import write_exr
+from luxcore.cameras import Camera
+from luxcore.data import compact
 from luxcore.render.effects import Effects
 from luxcore.render.hdri import LUMINANCE
 from luxcore.render.views import View, view_to_json
-from luxcore.rooms.model import Room
+from luxcore.rooms.model import Lamp, Room
 
-COMPACT_VERSION = 1
 KEY_LUMINANCE = 0.18
 """Where the exposure puts the middle of the input photo (log-average of its darker 95 %)."""
 
 
-@dataclass(frozen=True)
-class RenderedView:
-    """What one render gave, before it is written."""
+def rendered_view(
+    room: Room,
+    view: View,
+    images: dict[str, np.ndarray],
+    surfaces: dict[str, np.ndarray],
+    masks: dict[str, np.ndarray],
+    effects: Effects,
+    render_facts: dict[str, Any],
+) -> compact.RenderedView:
+    """Put one render together.
 
-    room: Room
-    view: View
-    images: dict[str, np.ndarray]
-    """`ambient`, `light_00`, …: [h, w, 3] linear radiance, lamps white at 1 W."""
-    albedo: np.ndarray
-    normal: np.ndarray
-    ray_distance_m: np.ndarray
-    masks: dict[str, np.ndarray]
-    effects: Effects
-    spp: int
-    energy: dict[str, float]
-    """The factor that kept each light's energy through the denoiser."""
+    `images`: `ambient`, `light_00`, …: [h, w, 3] linear radiance, lamps white at 1 W.
+    `surfaces`: `albedo`, `normal` [h, w, 3] and `ray_distance_m` [h, w].
+    `masks`: `emitter_00`, `fixture_00`, `hull_00`, … and `window`, [h, w] bool.
+    `render_facts`: samples, energy factors; without times, so that equal renders give equal bytes.
+    """
+    lamps = range(len(room.lamps))
+    empty = np.zeros((0, *images["ambient"].shape), np.float32)
+    lights = np.stack([images[f"light_{k:02d}"] for k in lamps]) if lamps else empty
+    burning = np.array([lamp.on * np.array(lamp.scale) for lamp in room.lamps], np.float32)
+    photo = compact.compose(images["ambient"], lights, burning)
+    about = view_to_json(view)
+    return compact.RenderedView(
+        room=room.id,
+        kind=about["kind"],
+        c2w=view.c2w,
+        camera=view if isinstance(view, Camera) else None,
+        ambient=images["ambient"],
+        lights=lights,
+        albedo=surfaces["albedo"],
+        normal=surfaces["normal"],
+        ray_distance_m=surfaces["ray_distance_m"],
+        masks={
+            kind: np.stack([masks[f"{kind}_{k:02d}"] for k in lamps]) for kind in compact.MASK_KINDS
+        },
+        window=masks["window"],
+        lamps=tuple(_lamp(lamp) for lamp in room.lamps),
+        exposure=photo_exposure(photo),
+        metadata={
+            **about,
+            "room": room.id,
+            "seed": room.seed,
+            "use": room.use,
+            "lamps": [
+                {"design": lamp.design, "temperature_k": lamp.temperature_k} for lamp in room.lamps
+            ],
+            "environment": _environment(room),
+            "effects": effects.to_json(),
+            **render_facts,
+        },
+    )
 
 
-def input_linear(room: Room, images: dict[str, np.ndarray]) -> np.ndarray:
-    """The photo as taken: ambient + Σ on·scale·light (equation 1), [h, w, 3] linear radiance."""
-    total = np.asarray(images["ambient"], np.float32).copy()
-    for lamp in room.lamps:
-        if lamp.on:
-            total += np.array(lamp.scale, np.float32) * images[f"light_{lamp.id:02d}"]
-    return total
-
-
-def photo_exposure(image: np.ndarray) -> float:
+def photo_exposure(image: Float[np.ndarray, "h w 3"]) -> float:
     """The factor g that brings the log-average luminance of the darker 95 % to KEY_LUMINANCE."""
     luminance = (image @ LUMINANCE).ravel()
     kept = np.sort(luminance)[: max(1, int(0.95 * luminance.size))]
     return float(KEY_LUMINANCE / np.exp(np.log(kept + 1e-6).mean()))
 
 
-def write_view(folder: Path, name: str, rendered: RenderedView) -> None:
-    """Write the four files. Pixels depend on nothing but the room, the view and the settings."""
-    images = {**rendered.images, "albedo": rendered.albedo, "normal": rendered.normal}
-    clipped = write_exr(folder / f"{name}.exr", images)
-    geometry = {"ray_distance_m": rendered.ray_distance_m, "normal": rendered.normal}
-    write_exr(folder / f"{name}.geometry.exr", geometry, half=False)
-    masks = {k: m.astype(np.float32) for k, m in rendered.masks.items()}
-    write_exr(folder / f"{name}.masks.exr", masks)
-    write_json(folder / f"{name}.json", {**view_metadata(rendered), "clipped_values": clipped})
+def _lamp(lamp: Lamp) -> compact.Lamp:
+    return compact.Lamp(
+        lamp.name, lamp.kind, lamp.position, lamp.power_w, lamp.color, lamp.on, lamp.scale
+    )
 
 
-def view_metadata(rendered: RenderedView) -> dict[str, Any]:
-    """The JSON beside the pixels; without times, so that equal renders give equal bytes."""
-    room = rendered.room
+def _environment(room: Room) -> dict[str, Any] | None:
     environment = room.environment
+    if environment is None:
+        return None
     return {
-        "version": COMPACT_VERSION,
-        **view_to_json(rendered.view),
-        "room": room.id,
-        "seed": room.seed,
-        "use": room.use,
-        "lamps": [
-            {
-                "id": lamp.id,
-                "name": lamp.name,
-                "kind": lamp.kind,
-                "design": lamp.design,
-                "position": list(lamp.position),
-                "power_w": lamp.power_w,
-                "temperature_k": lamp.temperature_k,
-                "color": list(lamp.color),
-                "on": lamp.on,
-                "scale": list(lamp.scale),
-            }
-            for lamp in room.lamps
-        ],
-        "environment": None
-        if environment is None
-        else {
-            "hdri": Path(environment.hdri).stem,
-            "rotation_deg": environment.rotation_deg,
-            "mean_radiance": environment.mean_radiance,
-        },
-        "exposure": photo_exposure(input_linear(room, rendered.images)),
-        "effects": rendered.effects.to_json(),
-        "energy_factors": {k: round(v, 4) for k, v in rendered.energy.items()},
-        "spp": rendered.spp,
+        "hdri": Path(environment.hdri).stem,
+        "rotation_deg": environment.rotation_deg,
+        "mean_radiance": environment.mean_radiance,
     }

@@ -39,8 +39,12 @@ class Denoiser:
         height, width, _ = self._albedo.shape
         if self._normal.shape != (height, width, 3):
             raise ValueError(f"normal must have shape {self._albedo.shape}, got {normal.shape}.")
-        for name, image in (("color", self._color), ("albedo", self._albedo),
-                            ("normal", self._normal), ("output", self._output)):  # fmt: skip
+        for name, image in (
+            ("color", self._color),
+            ("albedo", self._albedo),
+            ("normal", self._normal),
+            ("output", self._output),
+        ):
             self._library.oidnSetSharedFilterImage(
                 self._filter, name.encode(), image.ctypes.data, _FLOAT3, width, height, 0, 0, 0
             )
@@ -109,14 +113,15 @@ def _load() -> Any:
         "oidnGetDeviceError": (ctypes.c_int, [pointer, ctypes.POINTER(text)]),
         "oidnNewFilter": (pointer, [pointer, text]),
         "oidnSetSharedFilterImage": (
-            None, [pointer, text, pointer, ctypes.c_int, size, size, size, size, size],
+            None,
+            [pointer, text, pointer, ctypes.c_int, size, size, size, size, size],
         ),
         "oidnSetFilterBool": (None, [pointer, text, ctypes.c_bool]),
         "oidnSetFilterInt": (None, [pointer, text, ctypes.c_int]),
         "oidnCommitFilter": (None, [pointer]),
         "oidnExecuteFilter": (None, [pointer]),
         "oidnReleaseFilter": (None, [pointer]),
-    }  # fmt: skip
+    }
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

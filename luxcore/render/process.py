@@ -60,11 +60,14 @@ class BlenderProcess:
         if self._child is not None and self._child.poll() is None:
             return self._child
         self.stop()
-        self._log = tempfile.TemporaryFile()
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the child)
         self._child = subprocess.Popen(
             [sys.executable, "-m", SERVER],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, env=_environment(),
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            env=_environment(),
+        )
         return self._child
 
     def _read_line(self, child: subprocess.Popen[bytes], timeout_s: float) -> bytes:

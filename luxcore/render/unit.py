@@ -10,8 +10,8 @@ from luxcore.render.views import View, view_to_json
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
 
-RENDER_CODE_VERSION = 1
-"""Raised when the same room would give other pixels, so that old units are not reused."""
+RENDER_CODE = ("luxcore/render", "luxcore/rooms/model.py", "luxcore/rooms/shapes.py")
+"""What a rendered view depends on beside its arguments (for the key of its unit)."""
 
 
 def view_job(

@@ -103,8 +103,10 @@ def _seated_table(rng: Rng, layout: Layout, palette: Palette) -> None:
     main = max(layout.plan.rects, key=lambda r: r.area)
     table = None
     for _ in range(30):
-        at = ((main.x0 + main.x1) / 2 + between(rng, -0.6, 0.6),
-              (main.y0 + main.y1) / 2 + between(rng, -0.6, 0.6))  # fmt: skip
+        at = (
+            (main.x0 + main.x1) / 2 + between(rng, -0.6, 0.6),
+            (main.y0 + main.y1) / 2 + between(rng, -0.6, 0.6),
+        )
         yaw = 0.0 if main.x1 - main.x0 > main.y1 - main.y0 else 90.0
         table = layout.in_the_open(piece, at, yaw)
         if table is not None:
@@ -114,8 +116,11 @@ def _seated_table(rng: Rng, layout: Layout, palette: Palette) -> None:
     chair = seats.chair(rng, palette)
     out_y = piece.depth / 2 + chair.depth / 2 - 0.12
     out_x = piece.width / 2 + chair.depth / 2 - 0.12
-    slots = [(dx, sign * out_y, 180.0 if sign > 0 else 0.0) for sign in (-1, 1)
-             for dx in ((-0.3, 0.3) if piece.width < 1.6 else (-0.55, 0.0, 0.55))]  # fmt: skip
+    slots = [
+        (dx, sign * out_y, 180.0 if sign > 0 else 0.0)
+        for sign in (-1, 1)
+        for dx in ((-0.3, 0.3) if piece.width < 1.6 else (-0.55, 0.0, 0.55))
+    ]
     slots += [(out_x, 0.0, 90.0), (-out_x, 0.0, -90.0)]
     for dx, dy, turn in slots:
         if chance(rng, 0.85):

@@ -116,17 +116,23 @@ class Layout:
     def window_between(self, number: int, low: float, high: float, top: float) -> bool:
         """Whether something of height `top` would stand before a window."""
         return any(
-            h.wall == number and h.kind == "window" and low < h.right and high > h.left
+            h.wall == number
+            and h.kind == "window"
+            and low < h.right
+            and high > h.left
             and top > h.sill + 0.25
             for h in self.holes
-        )  # fmt: skip
+        )
 
     def _crosses_hole(self, number: int, a: float, b: float, low: float, high: float) -> bool:
         return any(
-            h.wall == number and a < h.right + 0.25 and b > h.left - 0.25
-            and low < h.sill + h.height + 0.1 and high > h.sill - 0.1
+            h.wall == number
+            and a < h.right + 0.25
+            and b > h.left - 0.25
+            and low < h.sill + h.height + 0.1
+            and high > h.sill - 0.1
             for h in self.holes
-        )  # fmt: skip
+        )
 
     def _headroom(self, rect: Rect) -> float:
         return min(self.plan.ceiling_at(rect.y0), self.plan.ceiling_at(rect.y1))

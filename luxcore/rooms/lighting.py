@@ -34,8 +34,15 @@ class Fittings:
     on_tops: set[Vec3] = field(default_factory=set)
     """Centres of the surfaces that carry a table lamp: clutter keeps away from them."""
 
-    def add(self, rng: Rng, kind: LampKind, piece: LampPiece, at: Vec3, yaw_deg: float,
-            off_probability: float) -> None:  # fmt: skip
+    def add(
+        self,
+        rng: Rng,
+        kind: LampKind,
+        piece: LampPiece,
+        at: Vec3,
+        yaw_deg: float,
+        off_probability: float,
+    ) -> None:
         """Fix a lamp in the room, with its power, colour and switch."""
         index = len(self.lamps)
         low, high = POWER_W[kind]
@@ -45,16 +52,32 @@ class Fittings:
         power = round(low * (high / low) ** float(rng.random()), 3)
         center = _middle(piece, at, yaw_deg)
         self.lamps.append(
-            Lamp(index, f"{kind}_{index}", kind, piece.design, center, power, temperature,
-                 jittered(rng, black_body(temperature)), not chance(rng, off_probability))
-        )  # fmt: skip
+            Lamp(
+                index,
+                f"{kind}_{index}",
+                kind,
+                piece.design,
+                center,
+                power,
+                temperature,
+                jittered(rng, black_body(temperature)),
+                not chance(rng, off_probability),
+            )
+        )
         self.parts += [replace(p, lamp=index) for p in placed(piece.parts, at, yaw_deg)]
         for beam in piece.beams:
             aim = moved(beam.direction, (0.0, 0.0, 0.0), yaw_deg)
             self.spots.append(
-                Spot(index, moved(beam.position, at, yaw_deg), aim, beam.cone_deg, beam.blend,
-                     beam.radius_m, beam.emits)
-            )  # fmt: skip
+                Spot(
+                    index,
+                    moved(beam.position, at, yaw_deg),
+                    aim,
+                    beam.cone_deg,
+                    beam.blend,
+                    beam.radius_m,
+                    beam.emits,
+                )
+            )
 
 
 def light_room(
@@ -88,8 +111,10 @@ def _add_ceiling(
     for _ in range(12):
         rect = pick(rng, layout.plan.rects)
         spread = 0.12 if not others else 0.32
-        at = (round((rect.x0 + rect.x1) / 2 + (rect.x1 - rect.x0) * between(rng, -spread, spread), 4),
-              round((rect.y0 + rect.y1) / 2 + (rect.y1 - rect.y0) * between(rng, -spread, spread), 4))  # fmt: skip
+        at = (
+            round((rect.x0 + rect.x1) / 2 + (rect.x1 - rect.x0) * between(rng, -spread, spread), 4),
+            round((rect.y0 + rect.y1) / 2 + (rect.y1 - rect.y0) * between(rng, -spread, spread), 4),
+        )
         over_table = bool(tables) and not others and chance(rng, 0.6)
         if over_table:
             at = tables[0].at
@@ -125,9 +150,10 @@ def _add_table(rng: Rng, layout: Layout, palette: Palette, fittings: Fittings, o
         (top, at, p.yaw_deg)
         for p in layout.placed
         for top, at in p.tops()
-        if at not in fittings.on_tops and top.z < 1.3
+        if at not in fittings.on_tops
+        and top.z < 1.3
         and min(top.width, top.depth) > 1.2 * piece.radius
-    ]  # fmt: skip
+    ]
     if surfaces:
         _, at, yaw = pick(rng, surfaces)
         fittings.on_tops.add(at)

@@ -17,9 +17,27 @@ ROOM_VERSION = 1
 
 LampKind = Literal["ceiling", "wall", "floor", "table"]
 MaterialKind = Literal[
-    "paint", "stripes", "damask", "planks", "tile", "carpet", "rug", "fabric", "wood", "metal",
-    "ceramic", "glass", "pane", "mirror", "leaf", "picture", "stone", "paper", "screen", "brick",
-]  # fmt: skip
+    "paint",
+    "stripes",
+    "damask",
+    "planks",
+    "tile",
+    "carpet",
+    "rug",
+    "fabric",
+    "wood",
+    "metal",
+    "ceramic",
+    "glass",
+    "pane",
+    "mirror",
+    "leaf",
+    "picture",
+    "stone",
+    "paper",
+    "screen",
+    "brick",
+]
 
 
 @dataclass(frozen=True)
@@ -171,8 +189,10 @@ def _room(value: dict[str, Any]) -> Room:
 def _part(value: dict[str, Any]) -> Part:
     fields = dict(value)
     shape = dict(fields.pop("shape"))
-    kinds = {s.__name__: s for s in (shapes.Box, shapes.Lathe, shapes.Ellipsoid, shapes.Prism,
-                                     shapes.Drape)}  # fmt: skip
+    kinds = {
+        s.__name__: s
+        for s in (shapes.Box, shapes.Lathe, shapes.Ellipsoid, shapes.Prism, shapes.Drape)
+    }
     kind = kinds[shape.pop("type")]
     return Part(shape=kind(**_fields(shape)), **_fields(fields))
 

@@ -31,8 +31,14 @@ class Palette:
         self.materials.setdefault(name, material)
         return name
 
-    def new(self, kind: MaterialKind, color: Vec3, color2: Vec3 | None = None,
-            roughness: float = 0.6, scale: float = 0.1) -> str:  # fmt: skip
+    def new(
+        self,
+        kind: MaterialKind,
+        color: Vec3,
+        color2: Vec3 | None = None,
+        roughness: float = 0.6,
+        scale: float = 0.1,
+    ) -> str:
         """A material of its own, named by its number."""
         seed = int(self.rng.integers(1, 10_000))
         other = color if color2 is None else color2
@@ -83,18 +89,39 @@ def draw_palette(rng: Rng, use: str) -> Palette:
     _floor(palette, use, seed)
     for name in ("wood_a", "wood_b"):
         color, color2 = pick(rng, WOODS)
-        add(name, Material("wood", color, color2, between(rng, 0.3, 0.6),
-                           seed=int(rng.integers(1, 10_000))))  # fmt: skip
+        add(
+            name,
+            Material(
+                "wood", color, color2, between(rng, 0.3, 0.6), seed=int(rng.integers(1, 10_000))
+            ),
+        )
     for name in ("fabric_a", "fabric_b"):
         color = tone(rng, (0.05, 0.7), (0.2, 0.85))
-        add(name, Material("fabric", color, lighter(color, 1.4), 0.95, between(rng, 0.015, 0.08),
-                           int(rng.integers(1, 10_000))))  # fmt: skip
+        add(
+            name,
+            Material(
+                "fabric",
+                color,
+                lighter(color, 1.4),
+                0.95,
+                between(rng, 0.015, 0.08),
+                int(rng.integers(1, 10_000)),
+            ),
+        )
     add("brass", Material("metal", (0.78, 0.56, 0.25), roughness=between(rng, 0.2, 0.4)))
     add("steel", Material("metal", (0.6, 0.6, 0.61), roughness=between(rng, 0.2, 0.45)))
     add("black", Material("ceramic", (0.015, 0.015, 0.016), roughness=0.4))
     add("white_metal", Material("ceramic", (0.75, 0.75, 0.73), roughness=0.35))
-    add("trim", Material("ceramic", pick(rng, ((0.78, 0.77, 0.74), (0.7, 0.66, 0.58),
-                         (0.09, 0.09, 0.1), (0.3, 0.17, 0.08))), roughness=0.4))  # fmt: skip
+    add(
+        "trim",
+        Material(
+            "ceramic",
+            pick(
+                rng, ((0.78, 0.77, 0.74), (0.7, 0.66, 0.58), (0.09, 0.09, 0.1), (0.3, 0.17, 0.08))
+            ),
+            roughness=0.4,
+        ),
+    )
     add("leaf", Material("leaf", (0.04, 0.13, 0.03), (0.1, 0.26, 0.05), seed=seed))
     return palette
 
@@ -108,9 +135,17 @@ def _walls(palette: Palette, use: str, seed: int) -> None:
     feature = tone(rng, (0.1, 0.6), (0.3, 0.8))
     if kind == "brick":
         feature = pick(rng, ((0.32, 0.12, 0.07), (0.6, 0.57, 0.52), (0.4, 0.2, 0.13)))
-    palette.add("wall_feature", Material(kind, feature, lighter(feature, 1.6), 0.8,
-                between(rng, 0.07, 0.14) if kind == "brick" else between(rng, 0.06, 0.3),
-                seed))  # fmt: skip
+    palette.add(
+        "wall_feature",
+        Material(
+            kind,
+            feature,
+            lighter(feature, 1.6),
+            0.8,
+            between(rng, 0.07, 0.14) if kind == "brick" else between(rng, 0.06, 0.3),
+            seed,
+        ),
+    )
 
 
 def _floor(palette: Palette, use: str, seed: int) -> None:
@@ -119,13 +154,21 @@ def _floor(palette: Palette, use: str, seed: int) -> None:
     kind = pick(rng, ("planks", "tile", "carpet"), (0.45, 0.5, 0.05) if wet else (0.65, 0.12, 0.23))
     if kind == "planks":
         color, color2 = pick(rng, WOODS)
-        material = Material("planks", color, color2, between(rng, 0.25, 0.55),
-                            between(rng, 0.09, 0.2), seed)  # fmt: skip
+        material = Material(
+            "planks", color, color2, between(rng, 0.25, 0.55), between(rng, 0.09, 0.2), seed
+        )
     elif kind == "tile":
-        color = pick(rng, ((0.6, 0.58, 0.54), (0.35, 0.34, 0.33), (0.5, 0.33, 0.22),
-                           (0.72, 0.7, 0.66)))  # fmt: skip
-        material = Material("tile", color, lighter(color, 0.55), between(rng, 0.15, 0.4),
-                            between(rng, 0.25, 0.6), seed)  # fmt: skip
+        color = pick(
+            rng, ((0.6, 0.58, 0.54), (0.35, 0.34, 0.33), (0.5, 0.33, 0.22), (0.72, 0.7, 0.66))
+        )
+        material = Material(
+            "tile",
+            color,
+            lighter(color, 0.55),
+            between(rng, 0.15, 0.4),
+            between(rng, 0.25, 0.6),
+            seed,
+        )
     else:
         material = Material("carpet", tone(rng, (0.05, 0.35), (0.4, 0.75)), seed=seed)
     palette.add("floor", material)

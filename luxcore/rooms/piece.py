@@ -31,8 +31,14 @@ class Piece:
     tops: tuple[Top, ...] = ()
 
 
-def part(name: str, shape: Shape, material: str, at: Vec3 = (0.0, 0.0, 0.0),
-         turn: Vec3 = (0.0, 0.0, 0.0), smooth: bool = False) -> Part:  # fmt: skip
+def part(
+    name: str,
+    shape: Shape,
+    material: str,
+    at: Vec3 = (0.0, 0.0, 0.0),
+    turn: Vec3 = (0.0, 0.0, 0.0),
+    smooth: bool = False,
+) -> Part:
     """A part of furniture (no lamp)."""
     return Part(name, shape, material, at, turn, smooth=smooth)
 
@@ -49,11 +55,14 @@ def placed(parts: tuple[Part, ...], at: Vec3, yaw_deg: float = 0.0) -> tuple[Par
         replace(
             p,
             position=moved(p.position, at, yaw_deg),
-            rotation_deg=(p.rotation_deg[0], p.rotation_deg[1],
-                          round(p.rotation_deg[2] + yaw_deg, 4)),
+            rotation_deg=(
+                p.rotation_deg[0],
+                p.rotation_deg[1],
+                round(p.rotation_deg[2] + yaw_deg, 4),
+            ),
         )
         for p in parts
-    )  # fmt: skip
+    )
 
 
 def moved(point: Vec3, at: Vec3, yaw_deg: float) -> Vec3:

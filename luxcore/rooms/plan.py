@@ -41,9 +41,11 @@ class Rect:
     def overlap(self, other: Rect) -> float:
         """The area that both cover."""
         return Rect(
-            max(self.x0, other.x0), max(self.y0, other.y0),
-            min(self.x1, other.x1), min(self.y1, other.y1),
-        ).area  # fmt: skip
+            max(self.x0, other.x0),
+            max(self.y0, other.y0),
+            min(self.x1, other.x1),
+            min(self.y1, other.y1),
+        ).area
 
     def grown(self, margin: float) -> Rect:
         """Moved outward on every side."""
@@ -140,18 +142,34 @@ def draw_plan(rng: Rng) -> FloorPlan:
 def _shape(
     rng: Rng, form: str, width: float, depth: float
 ) -> tuple[tuple[Rect, ...], tuple[Vec2, ...]]:
+    outline: tuple[Vec2, ...]
+    rects: tuple[Rect, ...]
     if form == "ell":
         cut_x = round(width * between(rng, 0.5, 0.7), 3)
         cut_y = round(depth * between(rng, 0.45, 0.65), 3)
-        outline = ((0.0, 0.0), (width, 0.0), (width, cut_y), (cut_x, cut_y), (cut_x, depth),
-                   (0.0, depth))  # fmt: skip
+        outline = (
+            (0.0, 0.0),
+            (width, 0.0),
+            (width, cut_y),
+            (cut_x, cut_y),
+            (cut_x, depth),
+            (0.0, depth),
+        )
         rects = (Rect(0, 0, cut_x, depth), Rect(cut_x, 0, width, cut_y))
     elif form == "alcove":
         left = round(width * between(rng, 0.15, 0.35), 3)
         right = round(left + width * between(rng, 0.3, 0.45), 3)
         deep = round(depth + between(rng, 0.5, 1.0), 3)
-        outline = ((0.0, 0.0), (width, 0.0), (width, depth), (right, depth), (right, deep),
-                   (left, deep), (left, depth), (0.0, depth))  # fmt: skip
+        outline = (
+            (0.0, 0.0),
+            (width, 0.0),
+            (width, depth),
+            (right, depth),
+            (right, deep),
+            (left, deep),
+            (left, depth),
+            (0.0, depth),
+        )
         rects = (Rect(0, 0, width, depth), Rect(left, depth, right, deep))
     else:
         outline = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))

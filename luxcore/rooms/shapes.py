@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -64,13 +65,14 @@ class Lathe:
         closed = self.sweep_deg >= 360.0
         count = self.segments if closed else self.segments + 1
         angles = np.radians(self.sweep_deg) * np.arange(count) / self.segments
-        rings, vertices = [], []
+        rings: list[tuple[int, int]] = []
+        vertices: list[Vec3] = []
         for radius, z in self.profile:
             around = [(0.0, 0.0, z)] if radius <= 0 else _ring(radius, z, angles)
             rings.append((len(vertices), len(around)))
             vertices.extend(around)
         faces: list[tuple[int, ...]] = []
-        for (low, n_low), (high, n_high) in zip(rings, rings[1:], strict=False):
+        for (low, n_low), (high, n_high) in pairwise(rings):
             for k in range(self.segments):
                 quad = (
                     low + k % n_low,
@@ -219,7 +221,8 @@ def _bevelled_box(box: Box) -> Mesh:
     """Each corner becomes a triangle, each edge a strip: 24 vertices, 26 faces."""
     half = np.array(box.size) / 2
     bevel = min(box.bevel, 0.45 * float(half.min()) * 2)
-    vertices, index = [], {}
+    vertices: list[np.ndarray] = []
+    index: dict[tuple[tuple[int, int, int], int], int] = {}
     signs = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     for sign in signs:
         for axis in range(3):

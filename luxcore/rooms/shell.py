@@ -145,8 +145,16 @@ def _wall(wall: Wall, plan: FloorPlan, holes: tuple[Hole, ...], material: str) -
         for a, b, c, d in spans
         if b - a > 1e-6 and d - c > 1e-6
     ]
-    edges = [0.0, *(e for h in sorted(holes, key=lambda h: h.left) if h.sill < 0.1
-                    for e in (h.left, h.right)), wall.length]  # fmt: skip
+    edges = [
+        0.0,
+        *(
+            e
+            for h in sorted(holes, key=lambda h: h.left)
+            if h.sill < 0.1
+            for e in (h.left, h.right)
+        ),
+        wall.length,
+    ]
     for a, b in zip(edges[::2], edges[1::2], strict=True):
         if b - a > 0.05:
             board = Box((b - a, 0.015, 0.08), ((a + b) / 2, 0.0075, 0.04))
@@ -205,8 +213,14 @@ def _curtains(rng: Rng, hole: Hole, palette: Palette) -> list[Part]:
     folds = max(3, int(width / 0.09))
     cloth = Drape(width, round(top - bottom, 4), folds, 0.07, between(rng, 0.0, 0.5))
     right = hole.right + 0.12 - width
-    rod = Part("rod", cylinder(0.012, hole.width + 0.5), palette.metal(),
-               (hole.left - 0.25, 0.09, top), (0.0, 90.0, 0.0), smooth=True)  # fmt: skip
+    rod = Part(
+        "rod",
+        cylinder(0.012, hole.width + 0.5),
+        palette.metal(),
+        (hole.left - 0.25, 0.09, top),
+        (0.0, 90.0, 0.0),
+        smooth=True,
+    )
     left_cloth = Part("curtain", cloth, fabric, (hole.left - 0.12, 0.09, bottom), smooth=True)
     return [rod, left_cloth, replace(left_cloth, position=(round(right, 4), 0.09, bottom))]
 
@@ -231,10 +245,12 @@ def _door(rng: Rng, wall: Wall, hole: Hole, palette: Palette) -> list[Part]:
         inset = Box((w * 0.62, 0.02, tall), (x, 0.025, z), 0.008)
         parts.append(Part("panel", inset, material))
     for dx in (-w / 2 + 0.03, w / 2 - 0.03):
-        parts.append(Part("casing", Box((0.08, 0.05, h + 0.06), (x + dx, 0.02, h / 2 + 0.03)),
-                          "trim"))  # fmt: skip
+        parts.append(
+            Part("casing", Box((0.08, 0.05, h + 0.06), (x + dx, 0.02, h / 2 + 0.03)), "trim")
+        )
     parts.append(Part("casing", Box((w + 0.02, 0.05, 0.08), (x, 0.02, h + 0.03)), "trim"))
     handle: Vec3 = (x + w * 0.36, 0.07, 1.03)
-    parts.append(Part("handle", cylinder(0.012, 0.12), palette.metal(), handle, (0, -90.0, 0),
-                      smooth=True))  # fmt: skip
+    parts.append(
+        Part("handle", cylinder(0.012, 0.12), palette.metal(), handle, (0, -90.0, 0), smooth=True)
+    )
     return _in_wall(wall, parts)

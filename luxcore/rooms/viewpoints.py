@@ -33,8 +33,11 @@ def draw_viewpoints(rng: Rng, layout: Layout, lamps: list[Lamp]) -> tuple[Vec3, 
 
 def _candidate(rng: Rng, layout: Layout) -> Vec3:
     rect = pick(rng, layout.plan.rects, [r.area for r in layout.plan.rects])
-    return (between(rng, rect.x0, rect.x1), between(rng, rect.y0, rect.y1),
-            between(rng, *EYE_HEIGHT_M))  # fmt: skip
+    return (
+        between(rng, rect.x0, rect.x1),
+        between(rng, rect.y0, rect.y1),
+        between(rng, *EYE_HEIGHT_M),
+    )
 
 
 def _is_free(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from luxcore.data.compact import save_rendered
 from luxcore.files.digests import value_digest
 from luxcore.render.blender.passes import Passes, configure, render
 from luxcore.render.blender.scene import (
@@ -18,7 +19,7 @@ from luxcore.render.blender.scene import (
     lamp_group,
     place_camera,
 )
-from luxcore.render.compact import RenderedView, write_view
+from luxcore.render.compact import rendered_view
 from luxcore.render.effects import analyse_effects
 from luxcore.render.masks import lamp_masks
 from luxcore.render.oidn import Denoiser, keep_energy
@@ -41,21 +42,30 @@ class RenderJob:
         self._build(room, request["room"])
         place_camera(self._scene, view)
         configure(
-            self._scene, effects, spp=request["spp"], seed=request["seed"],
+            self._scene,
+            effects,
+            spp=request["spp"],
+            seed=request["seed"],
             threads=request["threads"],
-        )  # fmt: skip
+        )
         clock.append(_cpu_seconds())
         passes = render(self._scene)
         clock.append(_cpu_seconds())
         masks = _masks(passes, room, view)
         images, factors = _denoised(passes, masks, len(room.lamps), request)
         clock.append(_cpu_seconds())
-        rendered = RenderedView(
-            room=room, view=view, images=images, albedo=passes.albedo, normal=passes.normal,
-            ray_distance_m=passes.ray_distance_m, masks=masks, effects=effects,
-            spp=request["spp"], energy=factors,
-        )  # fmt: skip
-        write_view(out_dir, request["name"], rendered)
+        surfaces = {
+            "albedo": passes.albedo,
+            "normal": passes.normal,
+            "ray_distance_m": passes.ray_distance_m,
+        }
+        facts = {
+            "spp": request["spp"],
+            "denoise": request["denoise"],
+            "energy_factors": {k: round(v, 4) for k, v in factors.items()},
+        }
+        rendered = rendered_view(room, view, images, surfaces, masks, effects, facts)
+        save_rendered(rendered, out_dir / request["name"])
         clock.append(_cpu_seconds())
         steps = ("build", "render", "denoise", "write")
         return dict(zip(steps, np.diff(clock).round(3).tolist(), strict=True))
@@ -70,9 +80,12 @@ class RenderJob:
 
 def _masks(passes: Passes, room: Room, view: View) -> dict[str, np.ndarray]:
     masks = lamp_masks(
-        passes.index, len(room.lamps), fixture_code=FIXTURE_INDEX, emitter_code=EMITTER_INDEX,
+        passes.index,
+        len(room.lamps),
+        fixture_code=FIXTURE_INDEX,
+        emitter_code=EMITTER_INDEX,
         wraps=isinstance(view, PanoramaView),
-    )  # fmt: skip
+    )
     return {**masks, "window": passes.outside}
 
 
@@ -84,9 +97,11 @@ def _denoised(
     if request["denoise"] == "off":
         return {name: passes.groups[name] for name in names}, dict.fromkeys(names, 1.0)
     denoiser = Denoiser(
-        passes.guide_albedo, passes.guide_normal, quality=request["denoise"],
+        passes.guide_albedo,
+        passes.guide_normal,
+        quality=request["denoise"],
         threads=request["threads"],
-    )  # fmt: skip
+    )
     images, factors = {}, {}
     for name in names:
         noisy = passes.groups[name]

@@ -67,8 +67,13 @@ def _paint(graph: Graph, m: Material) -> Any:
 
 def _stripes(graph: Graph, m: Material) -> Any:
     vector = graph.coordinates((m.scale, m.scale, m.scale), _offset(m))
-    wave = graph.node("TexWave", {"bands_direction": "X"}, Vector=graph.swap_to_wall(vector),
-                      Scale=0.3, Distortion=0.0)  # fmt: skip
+    wave = graph.node(
+        "TexWave",
+        {"bands_direction": "X"},
+        Vector=graph.swap_to_wall(vector),
+        Scale=0.3,
+        Distortion=0.0,
+    )
     color = graph.ramp(wave.outputs["Fac"], (0.45, m.color), (0.55, m.color2))
     return graph.matt(color)
 
@@ -88,10 +93,18 @@ def _grain(graph: Graph, m: Material, vector: Any) -> Any:
 def _planks(graph: Graph, m: Material) -> Any:
     vector = graph.coordinates((1.0, 1.0, 1.0), 0.0)
     brick = graph.node(
-        "TexBrick", {"offset": 0.37}, Vector=vector, Scale=1.0, Color1=m.color,
-        Color2=_shade(m.color, 0.62), Mortar=_shade(m.color, 0.2), Mortar_Size=0.0025,
-        Brick_Width=m.scale * 8, Row_Height=m.scale, Bias=-0.1,
-    )  # fmt: skip
+        "TexBrick",
+        {"offset": 0.37},
+        Vector=vector,
+        Scale=1.0,
+        Color1=m.color,
+        Color2=_shade(m.color, 0.62),
+        Mortar=_shade(m.color, 0.2),
+        Mortar_Size=0.0025,
+        Brick_Width=m.scale * 8,
+        Row_Height=m.scale,
+        Bias=-0.1,
+    )
     grain = _grain(graph, m, graph.coordinates((1.2, 0.09, 0.09), _offset(m)))
     return graph.principled(graph.mix(0.5, brick.outputs["Color"], grain), m.roughness)
 
@@ -99,19 +112,33 @@ def _planks(graph: Graph, m: Material) -> Any:
 def _tile(graph: Graph, m: Material) -> Any:
     vector = graph.coordinates((1.0, 1.0, 1.0), 0.0)
     brick = graph.node(
-        "TexBrick", {"offset": 0.0}, Vector=vector, Scale=1.0, Color1=m.color,
-        Color2=_shade(m.color, 0.88), Mortar=m.color2, Mortar_Size=0.006,
-        Brick_Width=m.scale, Row_Height=m.scale,
-    )  # fmt: skip
+        "TexBrick",
+        {"offset": 0.0},
+        Vector=vector,
+        Scale=1.0,
+        Color1=m.color,
+        Color2=_shade(m.color, 0.88),
+        Mortar=m.color2,
+        Mortar_Size=0.006,
+        Brick_Width=m.scale,
+        Row_Height=m.scale,
+    )
     return graph.principled(brick.outputs["Color"], m.roughness)
 
 
 def _brick(graph: Graph, m: Material) -> Any:
     vector = graph.swap_to_wall(graph.coordinates((1.0, 1.0, 1.0), 0.0))
     brick = graph.node(
-        "TexBrick", Vector=vector, Scale=1.0, Color1=m.color, Color2=_shade(m.color, 0.7),
-        Mortar=m.color2, Mortar_Size=0.012, Brick_Width=m.scale * 3, Row_Height=m.scale,
-    )  # fmt: skip
+        "TexBrick",
+        Vector=vector,
+        Scale=1.0,
+        Color1=m.color,
+        Color2=_shade(m.color, 0.7),
+        Mortar=m.color2,
+        Mortar_Size=0.012,
+        Brick_Width=m.scale * 3,
+        Row_Height=m.scale,
+    )
     return graph.principled(brick.outputs["Color"], m.roughness)
 
 
@@ -124,12 +151,20 @@ def _carpet(graph: Graph, m: Material) -> Any:
 
 def _rug(graph: Graph, m: Material) -> Any:
     vector = graph.coordinates((m.scale, m.scale, m.scale), 0.0)
-    cells = graph.node("TexVoronoi", {"distance": "MANHATTAN"}, Vector=vector, Scale=1.0,
-                       Randomness=0.15 + (m.seed % 5) * 0.15)  # fmt: skip
+    cells = graph.node(
+        "TexVoronoi",
+        {"distance": "MANHATTAN"},
+        Vector=vector,
+        Scale=1.0,
+        Randomness=0.15 + (m.seed % 5) * 0.15,
+    )
     pattern = graph.ramp(
         cells.outputs["Distance"],
-        (0.2, m.color2), (0.34, m.color), (0.5, _shade(m.color2, 0.5)), (0.6, m.color),
-    )  # fmt: skip
+        (0.2, m.color2),
+        (0.34, m.color),
+        (0.5, _shade(m.color2, 0.5)),
+        (0.6, m.color),
+    )
     pile = _noise(graph, vector, 40.0, 2.0)
     color = graph.mix(0.25, pattern, graph.ramp(pile, (0.3, (0.02, 0.02, 0.02)), (0.7, m.color)))
     return graph.matt(color)

@@ -9,15 +9,25 @@ from luxcore.rooms.piece import Piece, Top, block, part
 from luxcore.rooms.shapes import Box, Ellipsoid, Lathe, cylinder
 
 
-def _legs(material: str, width: float, depth: float, height: float, inset: float = 0.06,
-          round_leg: bool = True) -> list[Part]:  # fmt: skip
+def _legs(
+    material: str,
+    width: float,
+    depth: float,
+    height: float,
+    inset: float = 0.06,
+    round_leg: bool = True,
+) -> list[Part]:
     x, y = width / 2 - inset, depth / 2 - inset
     if round_leg:
         leg = Lathe(((0.0, 0.0), (0.016, 0.0), (0.024, height), (0.0, height)), 10)
-        return [part("leg", leg, material, (a, b, 0.0), smooth=True) for a in (-x, x)
-                for b in (-y, y)]  # fmt: skip
-    return [block("leg", material, (0.045, 0.045, height), (a, b, 0.0)) for a in (-x, x)
-            for b in (-y, y)]  # fmt: skip
+        return [
+            part("leg", leg, material, (a, b, 0.0), smooth=True) for a in (-x, x) for b in (-y, y)
+        ]
+    return [
+        block("leg", material, (0.045, 0.045, height), (a, b, 0.0))
+        for a in (-x, x)
+        for b in (-y, y)
+    ]
 
 
 def sofa(rng: Rng, palette: Palette, seats: int | None = None) -> Piece:
@@ -34,21 +44,54 @@ def sofa(rng: Rng, palette: Palette, seats: int | None = None) -> Piece:
     ]
     arm_top = high + between(rng, 0.12, 0.22)
     for side in (-1, 1):
-        parts.append(block("arm", fabric, (arm, depth, arm_top - foot),
-                           (side * (width - arm) / 2, 0, foot), soft))  # fmt: skip
+        parts.append(
+            block(
+                "arm",
+                fabric,
+                (arm, depth, arm_top - foot),
+                (side * (width - arm) / 2, 0, foot),
+                soft,
+            )
+        )
     for k in range(count):
         x = (k - (count - 1) / 2) * seat
-        parts.append(block("seat", fabric, (seat - 0.01, depth - 0.24, high - foot - 0.2),
-                           (x, 0.1, foot + 0.2), 0.05))  # fmt: skip
+        parts.append(
+            block(
+                "seat",
+                fabric,
+                (seat - 0.01, depth - 0.24, high - foot - 0.2),
+                (x, 0.1, foot + 0.2),
+                0.05,
+            )
+        )
         cushion = Ellipsoid((seat / 2 - 0.01, 0.1, 0.23), 20, 0.45)
-        parts.append(part("cushion", cushion, fabric, (x, -depth / 2 + 0.28, high + 0.2),
-                          (-12.0, 0.0, 0.0), True))  # fmt: skip
+        parts.append(
+            part(
+                "cushion",
+                cushion,
+                fabric,
+                (x, -depth / 2 + 0.28, high + 0.2),
+                (-12.0, 0.0, 0.0),
+                True,
+            )
+        )
     for _ in range(int(rng.integers(0, 4))):
         size = between(rng, 0.17, 0.22)
         accent = palette.new("fabric", palette.accent(), scale=between(rng, 0.02, 0.12))
-        parts.append(part("scatter", Ellipsoid((size, 0.07, size), 16, 0.5), accent,
-                          (between(rng, -width / 2 + 0.35, width / 2 - 0.35), -depth / 2 + 0.43,
-                           high + size - 0.02), (-20.0, between(rng, -15, 15), 0.0), True))  # fmt: skip
+        parts.append(
+            part(
+                "scatter",
+                Ellipsoid((size, 0.07, size), 16, 0.5),
+                accent,
+                (
+                    between(rng, -width / 2 + 0.35, width / 2 - 0.35),
+                    -depth / 2 + 0.43,
+                    high + size - 0.02,
+                ),
+                (-20.0, between(rng, -15, 15), 0.0),
+                True,
+            )
+        )
     return Piece("sofa", tuple(parts), width, depth, back)
 
 
@@ -66,21 +109,46 @@ def chair(rng: Rng, palette: Palette) -> Piece:
     parts: list[Part] = []
     if chance(rng, 0.25):
         parts.append(part("column", cylinder(0.025, high), palette.metal(), smooth=True))
-        parts.append(part("foot", Lathe(((0.0, 0.0), (0.26, 0.0), (0.25, 0.02), (0.03, 0.05),
-                                         (0.0, 0.05)), 20), palette.metal(), smooth=True))  # fmt: skip
+        parts.append(
+            part(
+                "foot",
+                Lathe(((0.0, 0.0), (0.26, 0.0), (0.25, 0.02), (0.03, 0.05), (0.0, 0.05)), 20),
+                palette.metal(),
+                smooth=True,
+            )
+        )
     else:
         parts += _legs(frame, width, depth, high, 0.03, chance(rng, 0.6))
     parts.append(block("seat", seat, (width, depth, 0.05), (0, 0, high - 0.02), 0.015))
     for side in (-1, 1):
-        parts.append(block("post", frame, (0.03, 0.03, back - high),
-                           (side * (width / 2 - 0.03), -depth / 2 + 0.02, high)))  # fmt: skip
+        parts.append(
+            block(
+                "post",
+                frame,
+                (0.03, 0.03, back - high),
+                (side * (width / 2 - 0.03), -depth / 2 + 0.02, high),
+            )
+        )
     if chance(rng, 0.5):
         for k in range(3):
-            parts.append(block("slat", frame, (width - 0.06, 0.018, 0.06),
-                               (0, -depth / 2 + 0.02, high + 0.12 + k * (back - high - 0.2) / 2)))  # fmt: skip
+            parts.append(
+                block(
+                    "slat",
+                    frame,
+                    (width - 0.06, 0.018, 0.06),
+                    (0, -depth / 2 + 0.02, high + 0.12 + k * (back - high - 0.2) / 2),
+                )
+            )
     else:
-        parts.append(block("panel", seat, (width - 0.03, 0.04, back - high - 0.1),
-                           (0, -depth / 2 + 0.03, high + 0.1), 0.015))  # fmt: skip
+        parts.append(
+            block(
+                "panel",
+                seat,
+                (width - 0.03, 0.04, back - high - 0.1),
+                (0, -depth / 2 + 0.03, high + 0.1),
+                0.015,
+            )
+        )
     return Piece("chair", tuple(parts), width, depth, back)
 
 
@@ -88,8 +156,14 @@ def stool(rng: Rng, palette: Palette) -> Piece:
     """A pouf or a round stool."""
     radius, high = between(rng, 0.18, 0.28), between(rng, 0.38, 0.48)
     shape = Ellipsoid((radius, radius, high / 2), 24, 0.5)
-    return Piece("stool", (part("pouf", shape, palette.fabric(), (0, 0, high / 2), smooth=True),),
-                 2 * radius, 2 * radius, high, (Top((0, 0), radius, radius, high),))  # fmt: skip
+    return Piece(
+        "stool",
+        (part("pouf", shape, palette.fabric(), (0, 0, high / 2), smooth=True),),
+        2 * radius,
+        2 * radius,
+        high,
+        (Top((0, 0), radius, radius, high),),
+    )
 
 
 def bed(rng: Rng, palette: Palette) -> Piece:
@@ -103,19 +177,33 @@ def bed(rng: Rng, palette: Palette) -> Piece:
         *_legs(frame, width, depth, base, 0.08, False),
         block("frame", frame, (width + 0.06, depth, 0.12), (0, 0, base - 0.1)),
         block("mattress", sheet, (width, depth - 0.06, high - base), (0, 0.01, base), 0.05),
-        block("quilt", quilt, (width + 0.08, depth * 0.68, high - base - 0.05),
-              (0, depth * 0.15, base + 0.08), 0.05),
+        block(
+            "quilt",
+            quilt,
+            (width + 0.08, depth * 0.68, high - base - 0.05),
+            (0, depth * 0.15, base + 0.08),
+            0.05,
+        ),
         block("headboard", headboard, (width + 0.08, 0.07, head), (0, -depth / 2 + 0.02, 0), 0.02),
-    ]  # fmt: skip
+    ]
     pillows = 1 if width < 1.2 else 2
     for k in range(pillows):
         x = (k - (pillows - 1) / 2) * width / 2
-        parts.append(part("pillow", Ellipsoid((0.33, 0.22, 0.09), 20, 0.5), sheet,
-                          (x, -depth / 2 + 0.36, high + 0.08), (14.0, 0.0, 0.0), True))  # fmt: skip
+        parts.append(
+            part(
+                "pillow",
+                Ellipsoid((0.33, 0.22, 0.09), 20, 0.5),
+                sheet,
+                (x, -depth / 2 + 0.36, high + 0.08),
+                (14.0, 0.0, 0.0),
+                True,
+            )
+        )
     if chance(rng, 0.6):
         throw = palette.new("fabric", palette.accent(), scale=0.05)
-        parts.append(block("throw", throw, (width + 0.1, 0.45, 0.03),
-                           (0, depth * 0.34, high + 0.01), 0.012))  # fmt: skip
+        parts.append(
+            block("throw", throw, (width + 0.1, 0.45, 0.03), (0, depth * 0.34, high + 0.01), 0.012)
+        )
     return Piece("bed", tuple(parts), width + 0.1, depth, head)
 
 
@@ -123,6 +211,8 @@ def bench(rng: Rng, palette: Palette) -> Piece:
     """A long low seat."""
     width = between(rng, 0.9, 1.4)
     wood = palette.wood()
-    parts = [*_legs(wood, width, 0.36, 0.42, 0.05, False),
-             part("seat", Box((width, 0.36, 0.04), (0, 0, 0.44)), wood)]  # fmt: skip
+    parts = [
+        *_legs(wood, width, 0.36, 0.42, 0.05, False),
+        part("seat", Box((width, 0.36, 0.04), (0, 0, 0.44)), wood),
+    ]
     return Piece("bench", tuple(parts), width, 0.36, 0.46, (Top((0, 0), width, 0.36, 0.46),))

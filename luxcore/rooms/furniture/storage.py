@@ -20,20 +20,28 @@ def bookshelf(rng: Rng, palette: Palette) -> Piece:
     wood, shelves = palette.wood(), int(high / 0.36)
     pitch = (high - 0.08) / shelves
     colors = book_colors(rng, palette)
-    parts = [block("side", wood, (0.025, depth, high), (s * (width - 0.025) / 2, 0, 0))
-             for s in (-1, 1)]  # fmt: skip
+    parts = [
+        block("side", wood, (0.025, depth, high), (s * (width - 0.025) / 2, 0, 0)) for s in (-1, 1)
+    ]
     parts.append(block("back", wood, (width, 0.012, high), (0, -depth / 2 + 0.006, 0)))
     for k in range(shelves + 1):
         z = 0.05 + k * pitch
         parts.append(block("board", wood, (width - 0.05, depth, 0.022), (0, 0, z)))
         if k < shelves:
             parts += _books(rng, colors, palette, width - 0.06, depth, z + 0.022, pitch - 0.06)
-    return Piece("bookshelf", tuple(parts), width, depth, high + 0.03,
-                 (Top((0, 0), width - 0.1, depth - 0.06, round(0.072 + shelves * pitch, 4)),))  # fmt: skip
+    return Piece(
+        "bookshelf",
+        tuple(parts),
+        width,
+        depth,
+        high + 0.03,
+        (Top((0, 0), width - 0.1, depth - 0.06, round(0.072 + shelves * pitch, 4)),),
+    )
 
 
-def _books(rng: Rng, colors: list[str], palette: Palette, width: float, depth: float, z: float,
-           room: float) -> list[Part]:  # fmt: skip
+def _books(
+    rng: Rng, colors: list[str], palette: Palette, width: float, depth: float, z: float, room: float
+) -> list[Part]:
     parts: list[Part] = []
     x = -width / 2 + 0.01
     while x < width / 2 - 0.06:
@@ -46,8 +54,14 @@ def _books(rng: Rng, colors: list[str], palette: Palette, width: float, depth: f
             continue
         thick, tall = between(rng, 0.018, 0.048), room * between(rng, 0.62, 0.97)
         deep = depth * between(rng, 0.55, 0.8)
-        parts.append(block("book", pick(rng, colors), (thick - 0.001, deep, tall),
-                           (x + thick / 2, -depth / 2 + 0.02 + deep / 2, z)))  # fmt: skip
+        parts.append(
+            block(
+                "book",
+                pick(rng, colors),
+                (thick - 0.001, deep, tall),
+                (x + thick / 2, -depth / 2 + 0.02 + deep / 2, z),
+            )
+        )
         x += thick
     return parts
 
@@ -56,15 +70,24 @@ def vase(rng: Rng, palette: Palette, at: tuple[float, float, float], high: float
     """A turned pot."""
     r = high * between(rng, 0.22, 0.4)
     neck = between(rng, 0.3, 0.7)
-    profile = ((0.0, 0.0), (0.55 * r, 0.0), (r, 0.35 * high), (0.8 * r, 0.65 * high),
-               (neck * r, 0.85 * high), (neck * r * 1.2, high), (0.0, high - 0.01))  # fmt: skip
-    material = palette.new("ceramic", tone(rng, (0.0, 0.7), (0.2, 0.9)),
-                           roughness=between(rng, 0.15, 0.6))  # fmt: skip
+    profile = (
+        (0.0, 0.0),
+        (0.55 * r, 0.0),
+        (r, 0.35 * high),
+        (0.8 * r, 0.65 * high),
+        (neck * r, 0.85 * high),
+        (neck * r * 1.2, high),
+        (0.0, high - 0.01),
+    )
+    material = palette.new(
+        "ceramic", tone(rng, (0.0, 0.7), (0.2, 0.9)), roughness=between(rng, 0.15, 0.6)
+    )
     return part("vase", Lathe(profile, 20), material, at, smooth=True)
 
 
-def cabinet(rng: Rng, palette: Palette, name: str, width: float, depth: float, high: float,
-            doors: int) -> Piece:  # fmt: skip
+def cabinet(
+    rng: Rng, palette: Palette, name: str, width: float, depth: float, high: float, doors: int
+) -> Piece:
     """A box with doors or drawers in a row, handles and a plinth or legs."""
     wood = pick(rng, (palette.wood(), "white_metal"), (0.7, 0.3))
     handle, foot = palette.metal(), between(rng, 0.05, 0.16)
@@ -80,8 +103,9 @@ def cabinet(rng: Rng, palette: Palette, name: str, width: float, depth: float, h
         tall = (high - foot - 0.02) / rows
         for r in range(rows):
             z = foot + 0.01 + r * tall
-            parts.append(block("front", wood, (pitch - 0.012, 0.02, tall - 0.012),
-                               (x, depth / 2, z), 0.005))  # fmt: skip
+            parts.append(
+                block("front", wood, (pitch - 0.012, 0.02, tall - 0.012), (x, depth / 2, z), 0.005)
+            )
             bar = (0.1, 0.02, 0.012) if rows > 1 else (0.012, 0.02, 0.14)
             dx = 0.0 if rows > 1 else (pitch / 2 - 0.05) * (1 if k % 2 == 0 else -1)
             parts.append(block("handle", handle, bar, (x + dx, depth / 2 + 0.02, z + tall * 0.55)))
@@ -92,27 +116,31 @@ def cabinet(rng: Rng, palette: Palette, name: str, width: float, depth: float, h
 def sideboard(rng: Rng, palette: Palette) -> Piece:
     """Low and long."""
     width = between(rng, 1.1, 1.9)
-    return cabinet(rng, palette, "sideboard", width, 0.42, between(rng, 0.62, 0.85),
-                   int(width / 0.45))  # fmt: skip
+    return cabinet(
+        rng, palette, "sideboard", width, 0.42, between(rng, 0.62, 0.85), int(width / 0.45)
+    )
 
 
 def wardrobe(rng: Rng, palette: Palette) -> Piece:
     """Tall."""
     width = between(rng, 0.9, 1.8)
-    return cabinet(rng, palette, "wardrobe", width, 0.58, between(rng, 1.9, 2.2),
-                   max(2, int(width / 0.5)))  # fmt: skip
+    return cabinet(
+        rng, palette, "wardrobe", width, 0.58, between(rng, 1.9, 2.2), max(2, int(width / 0.5))
+    )
 
 
 def dresser(rng: Rng, palette: Palette) -> Piece:
     """Drawers at hip height."""
-    return cabinet(rng, palette, "dresser", between(rng, 0.8, 1.2), 0.45, between(rng, 0.75, 0.95),
-                   2)  # fmt: skip
+    return cabinet(
+        rng, palette, "dresser", between(rng, 0.8, 1.2), 0.45, between(rng, 0.75, 0.95), 2
+    )
 
 
 def media_unit(rng: Rng, palette: Palette) -> Piece:
     """A low cabinet with a television on it."""
-    base = cabinet(rng, palette, "media_unit", between(rng, 1.2, 1.8), 0.4,
-                   between(rng, 0.4, 0.55), 3)  # fmt: skip
+    base = cabinet(
+        rng, palette, "media_unit", between(rng, 1.2, 1.8), 0.4, between(rng, 0.4, 0.55), 3
+    )
     width = between(rng, 0.9, 1.25)
     screen = palette.new("screen", (0.008, 0.008, 0.01), roughness=0.1)
     z = base.height
@@ -128,8 +156,13 @@ def media_unit(rng: Rng, palette: Palette) -> Piece:
 def kitchen_run(rng: Rng, palette: Palette, width: float) -> Piece:
     """Base units, a worktop with a sink and a hob, a splashback of tiles, wall units."""
     base = cabinet(rng, palette, "kitchen", width, 0.6, 0.86, max(2, int(width / 0.55)))
-    worktop = palette.new("stone", pick(rng, ((0.7, 0.68, 0.65), (0.1, 0.1, 0.1),
-                          (0.45, 0.3, 0.18))), (0.3, 0.29, 0.28), 0.2, 0.4)  # fmt: skip
+    worktop = palette.new(
+        "stone",
+        pick(rng, ((0.7, 0.68, 0.65), (0.1, 0.1, 0.1), (0.45, 0.3, 0.18))),
+        (0.3, 0.29, 0.28),
+        0.2,
+        0.4,
+    )
     tiles = palette.new("brick", tone(rng, (0.0, 0.5), (0.5, 0.95)), (0.6, 0.59, 0.57), 0.15, 0.08)
     parts = [
         *base.parts,
@@ -138,15 +171,22 @@ def kitchen_run(rng: Rng, palette: Palette, width: float) -> Piece:
         block("hob", "black", (0.56, 0.48, 0.008), (width * 0.22, 0, 0.9)),
         block("sink", "steel", (0.5, 0.4, 0.012), (-width * 0.22, 0, 0.895)),
         part("tap", cylinder(0.014, 0.26), "steel", (-width * 0.22, -0.22, 0.9), smooth=True),
-        part("spout", cylinder(0.012, 0.16), "steel", (-width * 0.22, -0.22, 1.15), (-90.0, 0, 0),
-             True),
-    ]  # fmt: skip
+        part(
+            "spout",
+            cylinder(0.012, 0.16),
+            "steel",
+            (-width * 0.22, -0.22, 1.15),
+            (-90.0, 0, 0),
+            True,
+        ),
+    ]
     if chance(rng, 0.75):
         upper = cabinet(rng, palette, "upper", width, 0.34, 0.6, max(2, int(width / 0.5)))
         for p in upper.parts:
             x, y, z = p.position
-            parts.append(part(p.name, p.shape, p.material, (x, y - 0.13, round(z + 1.4, 4)),
-                              p.rotation_deg))  # fmt: skip
+            parts.append(
+                part(p.name, p.shape, p.material, (x, y - 0.13, round(z + 1.4, 4)), p.rotation_deg)
+            )
     return Piece(
         "kitchen", tuple(parts), width, 0.64, 2.0, (Top((0, 0.05), width * 0.3, 0.4, 0.9),)
     )
@@ -156,8 +196,17 @@ def plant(rng: Rng, palette: Palette) -> Piece:
     """A pot with a bush, a palm or a rubber tree of flat leaves."""
     size = between(rng, 0.14, 0.2)
     high = between(rng, 0.7, 1.6)
-    pot = Lathe(((0.0, 0.0), (size * 0.75, 0.0), (size, size * 1.7), (size * 0.9, size * 1.7),
-                 (size * 0.85, size * 1.55), (0.0, size * 1.55)), 24)  # fmt: skip
+    pot = Lathe(
+        (
+            (0.0, 0.0),
+            (size * 0.75, 0.0),
+            (size, size * 1.7),
+            (size * 0.9, size * 1.7),
+            (size * 0.85, size * 1.55),
+            (0.0, size * 1.55),
+        ),
+        24,
+    )
     material = palette.new("ceramic", tone(rng, (0.0, 0.6), (0.2, 0.9)), roughness=0.5)
     parts = [part("pot", pot, material, smooth=True)]
     stem = cylinder(0.012, high * 0.6, size * 1.5)
@@ -171,6 +220,9 @@ def plant(rng: Rng, palette: Palette) -> Piece:
         import math
 
         at = (out * math.cos(math.radians(yaw)), out * math.sin(math.radians(yaw)), z)
-        parts.append(part("leaf", leaf, "leaf", at, (between(rng, -25, 25), between(rng, -60, 15),
-                                                     yaw), True))  # fmt: skip
+        parts.append(
+            part(
+                "leaf", leaf, "leaf", at, (between(rng, -25, 25), between(rng, -60, 15), yaw), True
+            )
+        )
     return Piece("plant", tuple(parts), 0.5, 0.5, high)

@@ -19,15 +19,25 @@ def table(rng: Rng, palette: Palette, name: str, width: float, depth: float, hig
     if is_round:
         width = depth = round((width + depth) / 2, 3)
         plate = part("top", cylinder(width / 2, thick, under, 40), top_material, smooth=False)
-        column = Lathe(((0.0, 0.0), (0.24 * width + 0.05, 0.0), (0.24 * width, 0.025),
-                        (0.04, 0.06), (0.035, under), (0.0, under)), 24)  # fmt: skip
+        column = Lathe(
+            (
+                (0.0, 0.0),
+                (0.24 * width + 0.05, 0.0),
+                (0.24 * width, 0.025),
+                (0.04, 0.06),
+                (0.035, under),
+                (0.0, under),
+            ),
+            24,
+        )
         parts = [plate, part("column", column, base, smooth=True)]
         free = width * 0.62
         return Piece(name, tuple(parts), width, depth, high, (Top((0, 0), free, free, high),))
     parts = [block("top", top_material, (width, depth, thick), (0, 0, under), 0.006)]
     parts += _underframe(rng, base, width, depth, under)
-    return Piece(name, tuple(parts), width, depth, high,
-                 (Top((0, 0), width - 0.1, depth - 0.1, high),))  # fmt: skip
+    return Piece(
+        name, tuple(parts), width, depth, high, (Top((0, 0), width - 0.1, depth - 0.1, high),)
+    )
 
 
 def _underframe(rng: Rng, base: str, width: float, depth: float, under: float) -> list[Part]:
@@ -45,21 +55,38 @@ def _underframe(rng: Rng, base: str, width: float, depth: float, under: float) -
 
 def _hard_top(rng: Rng, palette: Palette) -> str:
     if chance(rng, 0.5):
-        return palette.new("stone", pick(rng, ((0.75, 0.73, 0.7), (0.08, 0.08, 0.085))),
-                           (0.35, 0.33, 0.32), 0.18, 0.5)  # fmt: skip
+        return palette.new(
+            "stone",
+            pick(rng, ((0.75, 0.73, 0.7), (0.08, 0.08, 0.085))),
+            (0.35, 0.33, 0.32),
+            0.18,
+            0.5,
+        )
     return palette.new("ceramic", pick(rng, ((0.8, 0.8, 0.79), (0.03, 0.03, 0.03))), roughness=0.3)
 
 
 def coffee_table(rng: Rng, palette: Palette) -> Piece:
     """Low, before a sofa."""
-    return table(rng, palette, "coffee_table", between(rng, 0.7, 1.2), between(rng, 0.5, 0.75),
-                 between(rng, 0.34, 0.45))  # fmt: skip
+    return table(
+        rng,
+        palette,
+        "coffee_table",
+        between(rng, 0.7, 1.2),
+        between(rng, 0.5, 0.75),
+        between(rng, 0.34, 0.45),
+    )
 
 
 def dining_table(rng: Rng, palette: Palette) -> Piece:
     """For four to eight."""
-    return table(rng, palette, "dining_table", between(rng, 1.1, 1.9), between(rng, 0.8, 1.0),
-                 between(rng, 0.72, 0.77))  # fmt: skip
+    return table(
+        rng,
+        palette,
+        "dining_table",
+        between(rng, 1.1, 1.9),
+        between(rng, 0.8, 1.0),
+        between(rng, 0.72, 0.77),
+    )
 
 
 def side_table(rng: Rng, palette: Palette) -> Piece:
@@ -70,8 +97,14 @@ def side_table(rng: Rng, palette: Palette) -> Piece:
 
 def console(rng: Rng, palette: Palette) -> Piece:
     """Narrow, against a wall."""
-    return table(rng, palette, "console", between(rng, 0.9, 1.3), between(rng, 0.3, 0.38),
-                 between(rng, 0.76, 0.85))  # fmt: skip
+    return table(
+        rng,
+        palette,
+        "console",
+        between(rng, 0.9, 1.3),
+        between(rng, 0.3, 0.38),
+        between(rng, 0.76, 0.85),
+    )
 
 
 def desk(rng: Rng, palette: Palette) -> Piece:
@@ -82,14 +115,24 @@ def desk(rng: Rng, palette: Palette) -> Piece:
     x = width / 2 - 0.28
     parts.append(block("drawers", wood, (0.4, depth - 0.12, 0.6), (x, 0, 0.08)))
     for k in range(3):
-        parts.append(block("front", wood, (0.37, 0.02, 0.17), (x, depth / 2 - 0.05, 0.1 + k * 0.19),
-                           0.005))  # fmt: skip
-        parts.append(block("knob", palette.metal(), (0.1, 0.02, 0.012),
-                           (x, depth / 2 - 0.03, 0.18 + k * 0.19)))  # fmt: skip
+        parts.append(
+            block("front", wood, (0.37, 0.02, 0.17), (x, depth / 2 - 0.05, 0.1 + k * 0.19), 0.005)
+        )
+        parts.append(
+            block(
+                "knob", palette.metal(), (0.1, 0.02, 0.012), (x, depth / 2 - 0.03, 0.18 + k * 0.19)
+            )
+        )
     if chance(rng, 0.7):
         parts += _monitor(rng, palette, 0.74, -depth / 2 + 0.2)
-    return Piece("desk", tuple(parts), width, depth, 0.74,
-                 (Top((-width * 0.3, 0), width * 0.3, depth - 0.15, 0.74),))  # fmt: skip
+    return Piece(
+        "desk",
+        tuple(parts),
+        width,
+        depth,
+        0.74,
+        (Top((-width * 0.3, 0), width * 0.3, depth - 0.15, 0.74),),
+    )
 
 
 def _monitor(rng: Rng, palette: Palette, z: float, y: float) -> list[Part]:
@@ -99,10 +142,11 @@ def _monitor(rng: Rng, palette: Palette, z: float, y: float) -> list[Part]:
         block("stand", "black", (0.22, 0.16, 0.012), (0.1, y, z)),
         block("neck", "black", (0.05, 0.02, 0.16), (0.1, y, z)),
         block("bezel", "black", (width, 0.03, width * 0.6), (0.1, y, z + 0.12)),
-        block("screen", screen, (width - 0.02, 0.004, width * 0.6 - 0.02),
-              (0.1, y + 0.017, z + 0.13)),
+        block(
+            "screen", screen, (width - 0.02, 0.004, width * 0.6 - 0.02), (0.1, y + 0.017, z + 0.13)
+        ),
         block("keyboard", "white_metal", (0.42, 0.13, 0.018), (0.1, y + 0.28, z)),
-    ]  # fmt: skip
+    ]
 
 
 def nightstand(rng: Rng, palette: Palette) -> Piece:
@@ -112,15 +156,36 @@ def nightstand(rng: Rng, palette: Palette) -> Piece:
     parts = [block("box", wood, (width, depth, high - 0.1), (0, 0, 0.1), 0.006)]
     for a in (-1, 1):
         for b in (-1, 1):
-            parts.append(block("leg", wood, (0.03, 0.03, 0.1),
-                               (a * (width / 2 - 0.03), b * (depth / 2 - 0.03), 0)))  # fmt: skip
+            parts.append(
+                block(
+                    "leg",
+                    wood,
+                    (0.03, 0.03, 0.1),
+                    (a * (width / 2 - 0.03), b * (depth / 2 - 0.03), 0),
+                )
+            )
     drawers = int(pick(rng, (1, 2)))
     tall = (high - 0.14) / drawers
     for k in range(drawers):
         z = 0.12 + k * tall
-        parts.append(block("front", wood, (width - 0.05, 0.02, tall - 0.02), (0, depth / 2, z),
-                           0.006))  # fmt: skip
-        parts.append(part("knob", cylinder(0.014, 0.03), palette.metal(),
-                          (0, depth / 2 + 0.01, z + tall / 2), (-90.0, 0, 0), True))  # fmt: skip
-    return Piece("nightstand", tuple(parts), width, depth, high,
-                 (Top((0, 0), width - 0.08, depth - 0.08, high),))  # fmt: skip
+        parts.append(
+            block("front", wood, (width - 0.05, 0.02, tall - 0.02), (0, depth / 2, z), 0.006)
+        )
+        parts.append(
+            part(
+                "knob",
+                cylinder(0.014, 0.03),
+                palette.metal(),
+                (0, depth / 2 + 0.01, z + tall / 2),
+                (-90.0, 0, 0),
+                True,
+            )
+        )
+    return Piece(
+        "nightstand",
+        tuple(parts),
+        width,
+        depth,
+        high,
+        (Top((0, 0), width - 0.08, depth - 0.08, high),),
+    )

@@ -22,8 +22,13 @@ def _cord(rng: Rng, palette: Palette, drop: float) -> list[Part]:
 def dome(rng: Rng, palette: Palette) -> LampPiece:
     """Opaque metal dome: a cone."""
     drop, r = between(rng, 0.35, 0.75), between(rng, 0.15, 0.28)
-    profile = ((r, -drop - r * 0.75), (r * 0.93, -drop - r * 0.4), (r * 0.6, -drop - r * 0.1),
-               (0.03, -drop), (0.0, -drop))  # fmt: skip
+    profile = (
+        (r, -drop - r * 0.75),
+        (r * 0.93, -drop - r * 0.4),
+        (r * 0.6, -drop - r * 0.1),
+        (0.03, -drop),
+        (0.0, -drop),
+    )
     material = palette.new("ceramic", palette.accent(), roughness=0.3)
     parts = [*_cord(rng, palette, drop), *hood(profile, material, -drop - r * 0.68, r * 0.94)]
     return LampPiece("dome", tuple(parts), (), drop + r * 0.75, r)
@@ -70,17 +75,21 @@ def chandelier(rng: Rng, palette: Palette) -> LampPiece:
     drop, arms = between(rng, 0.35, 0.6), int(rng.integers(3, 7))
     reach, r, metal = between(rng, 0.2, 0.34), between(rng, 0.035, 0.06), palette.metal()
     upward = rng.random() < 0.5
-    parts = [*_cord(rng, palette, drop), solid("hub", Ellipsoid((0.04, 0.04, 0.05)), metal,
-             (0.0, 0.0, -drop))]  # fmt: skip
+    parts = [
+        *_cord(rng, palette, drop),
+        solid("hub", Ellipsoid((0.04, 0.04, 0.05)), metal, (0.0, 0.0, -drop)),
+    ]
     for k in range(arms):
         yaw = 360.0 * k / arms
         c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
-        parts.append(solid("arm", cylinder(0.009, reach, 0.0, 8), metal, (0.0, 0.0, -drop),
-                           (0.0, 90.0, yaw)))  # fmt: skip
+        parts.append(
+            solid("arm", cylinder(0.009, reach, 0.0, 8), metal, (0.0, 0.0, -drop), (0.0, 90.0, yaw))
+        )
         z = -drop + (r if upward else -r)
         bulb = Ellipsoid((r, r, r), 16)
-        parts.append(glow("bulb", bulb, 1.0 / arms, (round(c * reach, 4), round(s * reach, 4),
-                                                     round(z, 4))))  # fmt: skip
+        parts.append(
+            glow("bulb", bulb, 1.0 / arms, (round(c * reach, 4), round(s * reach, 4), round(z, 4)))
+        )
     return LampPiece("chandelier", tuple(parts), (), drop + 2 * r, reach + r)
 
 
@@ -101,8 +110,16 @@ def spots(rng: Rng, palette: Palette) -> LampPiece:
         parts.append(solid("head", cylinder(0.04, 0.11, -0.05, 20), metal, at, turn))
         mouth = tuple(round(a + 0.056 * b, 4) for a, b in zip(at, aim, strict=True))
         parts.append(glow("mouth", cylinder(0.034, 0.004, -0.056, 20), 0.1 / heads, at, turn))
-        beams.append(Beam((mouth[0], mouth[1], mouth[2]), aim, between(rng, 45, 85),
-                          between(rng, 0.3, 1.0), 0.03, 0.9 / heads))  # fmt: skip
+        beams.append(
+            Beam(
+                (mouth[0], mouth[1], mouth[2]),
+                aim,
+                between(rng, 45, 85),
+                between(rng, 0.3, 1.0),
+                0.03,
+                0.9 / heads,
+            )
+        )
     return LampPiece("spots", tuple(parts), tuple(beams), 0.2, length / 2)
 
 
@@ -110,8 +127,10 @@ def linear(rng: Rng, palette: Palette) -> LampPiece:
     """A bar over a table: light from its underside, or all round."""
     drop, length = between(rng, 0.5, 0.9), between(rng, 0.8, 1.3)
     metal, all_round = palette.metal(), rng.random() < 0.4
-    parts = [solid("cord", cylinder(0.004, drop, -drop, 6), "black", (x, 0.0, 0.0))
-             for x in (-length / 3, length / 3)]  # fmt: skip
+    parts = [
+        solid("cord", cylinder(0.004, drop, -drop, 6), "black", (x, 0.0, 0.0))
+        for x in (-length / 3, length / 3)
+    ]
     if all_round:
         tube = cylinder(0.03, length, -length / 2, 16)
         parts.append(glow("tube", tube, 1.0, (0.0, 0.0, -drop - 0.03), (0.0, 90.0, 0.0)))
@@ -127,14 +146,26 @@ def bowl(rng: Rng, palette: Palette) -> LampPiece:
     from luxcore.rooms.shapes import Lathe, disc
 
     shell = Lathe(((0.0, -drop - r * 0.6), (r * 0.6, -drop - r * 0.45), (r, -drop)), 28)
-    parts = [*_cord(rng, palette, drop), solid("bowl", shell, palette.metal()),
-             glow("mouth", disc(r * 0.95, -drop - 0.02, up=True), 1.0)]  # fmt: skip
+    parts = [
+        *_cord(rng, palette, drop),
+        solid("bowl", shell, palette.metal()),
+        glow("mouth", disc(r * 0.95, -drop - 0.02, up=True), 1.0),
+    ]
     return LampPiece("bowl", tuple(parts), (), drop + r * 0.6, r)
 
 
 def draw(rng: Rng, palette: Palette) -> LampPiece:
     """One of the designs."""
-    designs: tuple[Design, ...] = (dome, globe, lantern, drum, panel, chandelier, spots, linear,
-                                   bowl)  # fmt: skip
+    designs: tuple[Design, ...] = (
+        dome,
+        globe,
+        lantern,
+        drum,
+        panel,
+        chandelier,
+        spots,
+        linear,
+        bowl,
+    )
     weights = (0.14, 0.14, 0.1, 0.15, 0.13, 0.12, 0.1, 0.06, 0.06)
     return pick(rng, designs, weights)(rng, palette)

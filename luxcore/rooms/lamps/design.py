@@ -43,20 +43,30 @@ class LampPiece:
 Design = Callable[[Rng, Palette], LampPiece]
 
 
-def solid(name: str, shape: Shape, material: str, at: Vec3 = (0.0, 0.0, 0.0),
-          turn: Vec3 = (0.0, 0.0, 0.0)) -> Part:  # fmt: skip
+def solid(
+    name: str, shape: Shape, material: str, at: Vec3 = (0.0, 0.0, 0.0), turn: Vec3 = (0.0, 0.0, 0.0)
+) -> Part:
     """A part of the fixture that gives no light."""
     return Part(name, shape, material, at, turn, lamp=0, smooth=True)
 
 
-def glow(name: str, shape: Shape, share: float, at: Vec3 = (0.0, 0.0, 0.0),
-         turn: Vec3 = (0.0, 0.0, 0.0)) -> Part:  # fmt: skip
+def glow(
+    name: str, shape: Shape, share: float, at: Vec3 = (0.0, 0.0, 0.0), turn: Vec3 = (0.0, 0.0, 0.0)
+) -> Part:
     """A part whose front gives `share` of the lamp's light."""
     return Part(name, shape, WHITE_GLASS, at, turn, lamp=0, emits=round(share, 5), smooth=True)
 
 
-def shade(base: float, top: float, low: float, high: float, side: float, down: float, up: float,
-          segments: int = 28) -> list[Part]:  # fmt: skip
+def shade(
+    base: float,
+    top: float,
+    low: float,
+    high: float,
+    side: float,
+    down: float,
+    up: float,
+    segments: int = 28,
+) -> list[Part]:
     """A cloth shade as the emitter: a glowing side, and discs for what leaves below and above.
 
     `base`, `top`: radii; `low`, `high`: heights; the three shares of the power.
@@ -69,8 +79,13 @@ def shade(base: float, top: float, low: float, high: float, side: float, down: f
     return parts
 
 
-def hood(profile: tuple[tuple[float, float], ...], material: str, mouth_z: float,
-         mouth_radius: float, share: float = 1.0) -> list[Part]:  # fmt: skip
+def hood(
+    profile: tuple[tuple[float, float], ...],
+    material: str,
+    mouth_z: float,
+    mouth_radius: float,
+    share: float = 1.0,
+) -> list[Part]:
     """An opaque hood whose mouth glows downward: a cone of light."""
     return [
         solid("hood", Lathe(profile, 28), material),

@@ -56,9 +56,14 @@ def picture_light(rng: Rng, palette: Palette) -> LampPiece:
     parts = (
         solid("arm", cylinder(0.008, out, 0.0, 8), metal, (0, 0, 0), (-90.0, 0, 0)),
         solid("bar", Box((length, 0.045, 0.035), (0, out, 0.0)), metal),
-        glow("strip", Box((length - 0.03, 0.03, 0.006)), 1.0, (0, out - 0.008, -0.02),
-             (-30.0, 0.0, 0.0)),
-    )  # fmt: skip
+        glow(
+            "strip",
+            Box((length - 0.03, 0.03, 0.006)),
+            1.0,
+            (0, out - 0.008, -0.02),
+            (-30.0, 0.0, 0.0),
+        ),
+    )
     return LampPiece("picture_light", parts, (), 0.08, length / 2)
 
 
@@ -87,16 +92,27 @@ def swing_spot(rng: Rng, palette: Palette) -> LampPiece:
         solid("head", Lathe(((0.05, -0.08), (0.03, 0.04), (0.0, 0.05)), 20), metal, at, turn),
         glow("mouth", cylinder(0.046, 0.004, -0.086, 20), 0.15, at, turn),
     )
-    beam = Beam((0.0, round(at[1] + 0.09 * aim[1], 4), round(0.09 * aim[2], 4)), aim,
-                between(rng, 60, 110), 0.8, 0.03, 0.85)  # fmt: skip
+    beam = Beam(
+        (0.0, round(at[1] + 0.09 * aim[1], 4), round(0.09 * aim[2], 4)),
+        aim,
+        between(rng, 60, 110),
+        0.8,
+        0.03,
+        0.85,
+    )
     return LampPiece("swing_spot", parts, (beam,), 0.15, 0.06)
 
 
 def _half_circle(radius: float, count: int = 12) -> list[tuple[float, float]]:
     import math
 
-    return [(round(radius * math.cos(math.pi * k / count), 5),
-             round(radius * math.sin(math.pi * k / count), 5)) for k in range(count + 1)]  # fmt: skip
+    return [
+        (
+            round(radius * math.cos(math.pi * k / count), 5),
+            round(radius * math.sin(math.pi * k / count), 5),
+        )
+        for k in range(count + 1)
+    ]
 
 
 def draw(rng: Rng, palette: Palette) -> LampPiece:
