@@ -14,10 +14,9 @@ from luxcore.files.atomic import write_json
 from luxcore.files.exr import write_exr
 from luxcore.light.agx import agx
 from luxcore.masks.store import FoundLamp, write_masks
-from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
 from luxcore.models.small.network import LampNet, NetworkShape
 from luxcore.models.small.sketch import SketchRooms
-from luxcore.models.small.weights import save_weights
+from luxcore.models.small.weights import CHANNELS, save_weights
 
 TINY = (8, 16)
 
@@ -33,8 +32,8 @@ def write_tiny_weights(folder: Path) -> tuple[Path, Path]:
     """Untrained sv and mv weights of a tiny network that still answers lamp by lamp."""
     torch.manual_seed(0)
     paths = (folder / "sv.safetensors", folder / "mv.safetensors")
-    for path, kind, inputs in zip(paths, ("sv", "mv"), (SV_CHANNELS, MV_CHANNELS), strict=True):
-        net = LampNet(NetworkShape(inputs, TINY))
+    for path, kind in zip(paths, ("sv", "mv"), strict=True):
+        net = LampNet(NetworkShape(*CHANNELS[kind], TINY))
         torch.nn.init.normal_(net.head.weight, std=0.02)
         save_weights(path, kind, net.shape, net.state_dict())
     return paths

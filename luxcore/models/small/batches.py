@@ -81,7 +81,8 @@ def group_example(
     example = to_example(target, geometry=True, keep=keep)
     lights = [_known_light(view, keep, rng) for view in references]
     view = TargetView(example.photo, example.masks, example.on, example.surfaces)
-    return multiview_features(view, target.camera, lights), example
+    features, warped = multiview_features(view, target.camera, lights)
+    return features, replace(example, warped=warped)
 
 
 def _features(example: Example) -> Tensor:

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from luxcore.data.crops import LitCrop
 from luxcore.models.small.features import PHOTO_MAX, Surfaces
+from luxcore.models.small.heads import WarpedLight
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import surfaces_of
 
@@ -32,6 +33,8 @@ class Example:
     surfaces: Surfaces | None
     lights: Float[Tensor, "k 3 h w"]
     ambient: Float[Tensor, "3 h w"]
+    warped: WarpedLight | None = None
+    """Light of references, for the multi-view model."""
 
 
 def to_example(

@@ -90,7 +90,7 @@ class _Fit:
             outputs = self.net(features)
         parts = outputs.float().split([len(f) for f, _ in batch])
         losses = [
-            example_loss(light_fields(part, example.on), example)
+            example_loss(light_fields(part, example.on, example.warped), example)
             for part, (_, example) in zip(parts, batch, strict=True)
         ]
         loss = torch.stack(losses).mean()

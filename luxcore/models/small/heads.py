@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.small.features import CLIPPED
+from luxcore.models.small.network import SV_OUTPUTS
 
 MAX_LOG_RATIO = 8.0
 """Natural log of the largest ratio between a switched-off lamp's light and the photo."""
@@ -40,9 +41,44 @@ class LightFields:
     log_boost: Float[Tensor, "k 3 h w"]
 
 
-def light_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> LightFields:
-    """The heads of all lamps of one photo, brought together."""
-    lamp, ambient, ratio, boost = outputs.float().chunk(4, dim=1)
+@dataclass(frozen=True)
+class WarpedLight:
+    """Light of the references at the places that a view sees, as a ratio to their own photos.
+
+    `known[k]` is 1 where some reference shows the place and knows lamp k, else 0.
+    """
+
+    ratio: Float[Tensor, "k 3 h w"]
+    known: Float[Tensor, "k 1 h w"]
+
+
+def light_fields(
+    outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"], warped: WarpedLight | None = None
+) -> LightFields:
+    """The heads of all lamps of one photo, brought together.
+
+    With `warped`, the 13th output says how far to trust it, and the answer lies between the
+    network's own and the warped one.
+    """
+    own = _own_fields(outputs[:, :SV_OUTPUTS].float(), on)
+    if warped is None or outputs.shape[1] == SV_OUTPUTS or not len(outputs):
+        return own
+    # Trust starts high (0.88): what another view shows of a diffuse surface is nearly the truth.
+    trust = warped.known * torch.sigmoid(outputs[:, SV_OUTPUTS:].float() + 2)
+    fraction = torch.lerp(own.fraction[1:], warped.ratio.clamp(0, 1), trust) * on.view(-1, 1, 1, 1)
+    total = fraction.sum(0, keepdim=True)
+    fraction = fraction / total.clamp_min(1)
+    ambient = (1 - fraction.sum(0, keepdim=True)).clamp_min(0)
+    log_ratio = torch.log(warped.ratio.clamp_min(1e-6)).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+    return LightFields(
+        torch.cat([ambient, fraction]),
+        torch.lerp(own.log_ratio, log_ratio, trust),
+        own.log_boost,
+    )
+
+
+def _own_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> LightFields:
+    lamp, ambient, ratio, boost = outputs.chunk(4, dim=1)
     # Each lamp's pass has its own view of the ambient; the burning lamps' mean speaks for it.
     ambient = (
         ambient[on].mean(0, keepdim=True)

@@ -63,8 +63,8 @@ class SmallHarmonizer:
             )
             return with_unseen(part, heard_of)
         target, camera = self._target(view)
-        features = multiview_features(target, camera, references, warp=self.warp)
-        fields = run_network(self.net, features, target.on)
+        features, warped = multiview_features(target, camera, references, warp=self.warp)
+        fields = run_network(self.net, features, target.on, warped)
         return finish(fields, target.photo, view.image_linear, view.masks, target.on)
 
     def _known_light(self, reference: Reference) -> KnownLight | None:

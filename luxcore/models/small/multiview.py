@@ -16,7 +16,7 @@ from torch import Tensor
 
 from luxcore.cameras import Camera
 from luxcore.models.small.features import Surfaces, lamp_centres, lamp_features
-from luxcore.models.small.heads import RATIO_FLOOR
+from luxcore.models.small.heads import RATIO_FLOOR, WarpedLight
 from luxcore.models.small.surfaces import pixel_rays
 
 DEPTH_TOLERANCE = 0.05
@@ -47,8 +47,9 @@ class TargetView:
 
 def multiview_features(
     target: TargetView, camera: Camera, references: Sequence[KnownLight], *, warp: bool = True
-) -> Float[Tensor, "k c h w"]:
-    """The MV_CHANNELS channels of every lamp: the single-view ones, warped light, Plücker rays.
+) -> tuple[Float[Tensor, "k c h w"], WarpedLight]:
+    """The MV_CHANNELS channels of every lamp (the single-view ones, warped light, Plücker rays),
+    and the warped light itself.
 
     `warp=False` leaves the warped light out: an ablation.
     """
@@ -60,7 +61,8 @@ def multiview_features(
     fraction = ratio.clamp(0, 1.5) * on
     log_ratio = torch.log(ratio + 1e-3) / 4 * ~on * (weight > 0)
     rays = pluecker(camera, references[0].camera if references else camera).expand(k, -1, -1, -1)
-    return torch.cat([single, fraction, log_ratio, (weight > 0).to(ratio), rays], dim=1)
+    warped = WarpedLight(ratio, (weight > 0).to(ratio))
+    return torch.cat([single, fraction, log_ratio, warped.known, rays], dim=1), warped
 
 
 def lamp_points(

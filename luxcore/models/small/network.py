@@ -14,8 +14,11 @@ import torch.nn.functional as fn
 from jaxtyping import Float
 from torch import Tensor, nn
 
-OUTPUTS = 12
+SV_OUTPUTS = 12
 """Four heads of RGB: lamp logit, ambient logit, log ratio of a lamp that is off, emitter boost."""
+
+MV_OUTPUTS = SV_OUTPUTS + 1
+"""And how far to trust the light that was warped in from the references."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class NetworkShape:
     """What must be equal for weights to fit."""
 
     inputs: int
+    outputs: int = SV_OUTPUTS
     widths: tuple[int, ...] = (48, 96, 192, 256)
     unshuffle: int = 2
     heads: int = 4
@@ -38,7 +42,7 @@ class NetworkShape:
 
 
 class LampNet(nn.Module):
-    """[b, inputs, h, w] → [b, OUTPUTS, h, w]; h and w multiples of `shape.stride`."""
+    """[b, inputs, h, w] → [b, outputs, h, w]; h and w multiples of `shape.stride`."""
 
     def __init__(self, shape: NetworkShape) -> None:
         super().__init__()
@@ -50,7 +54,7 @@ class LampNet(nn.Module):
         self.middle = nn.Sequential(Attention(widths[-1], shape.heads), Residual(*widths[-1:] * 2))
         pairs = list(pairwise(widths))[::-1]
         self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
-        self.head = nn.Conv2d(widths[0], OUTPUTS * block, 3, padding=1)
+        self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
         # Zero logits are an even share of the light: a sane start for every lamp.
         for parameter in self.head.parameters():
             nn.init.zeros_(parameter)

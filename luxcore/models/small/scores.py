@@ -18,7 +18,7 @@ def mean_psnr(net: LampNet, cases: Sequence[tuple[Tensor, Example]]) -> float:
     scores: list[Tensor] = []
     with torch.no_grad():
         for features, example in cases:
-            fields = light_fields(net(features), example.on)
+            fields = light_fields(net(features), example.on, example.warped)
             light = lamp_light(fields, example.photo, example.on)[example.on]
             scores += [_psnr(p, t) for p, t in zip(light, example.lights[example.on], strict=True)]
     return float(torch.stack(scores).mean()) if scores else float("nan")

@@ -19,8 +19,8 @@ from luxcore.models.small.grid import (
     masks_to_grid,
     photo_to_grid,
 )
-from luxcore.models.small.heads import LightFields, lamp_light, light_fields
-from luxcore.models.small.network import LampNet
+from luxcore.models.small.heads import LightFields, WarpedLight, lamp_light, light_fields
+from luxcore.models.small.network import SV_OUTPUTS, LampNet
 from luxcore.models.small.samples import chw
 
 
@@ -57,14 +57,17 @@ class SmallDecomposer:
 
 
 def run_network(
-    net: LampNet, features: Float[Tensor, "k c y x"], on: Bool[Tensor, " k"]
+    net: LampNet,
+    features: Float[Tensor, "k c y x"],
+    on: Bool[Tensor, " k"],
+    warped: WarpedLight | None = None,
 ) -> LightFields:
     """The light fields of one photo on the grid; K = 0 needs no network."""
     if not len(features):
-        return light_fields(features.new_zeros(0, 12, *features.shape[-2:]), on)
+        return light_fields(features.new_zeros(0, SV_OUTPUTS, *features.shape[-2:]), on)
     with torch.inference_mode():
         outputs = net(features.contiguous(memory_format=torch.channels_last))
-    return light_fields(outputs.clone(), on)
+    return light_fields(outputs.clone(), on, warped)
 
 
 def finish(

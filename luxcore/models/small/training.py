@@ -24,7 +24,7 @@ from luxcore.models.small.batches import GroupBatches, SingleBatches, group_exam
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
 from luxcore.models.small.fit import Batches, FitResult, FitSettings, fit
-from luxcore.models.small.network import LampNet, NetworkShape
+from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS, LampNet, NetworkShape
 from luxcore.models.small.pictures import validation_sheet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.scores import mean_psnr
@@ -34,6 +34,10 @@ from luxcore.settings.train_mv import TrainMvSettings
 from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
 WIDTHS = (40, 80, 160, 224)
+SHAPES = {
+    "sv": NetworkShape(SV_CHANNELS, SV_OUTPUTS, WIDTHS),
+    "mv": NetworkShape(MV_CHANNELS, MV_OUTPUTS, WIDTHS),
+}
 SKETCH_ROOMS = 100_000
 
 Cases = Sequence[tuple[Tensor, Example]]
@@ -64,7 +68,7 @@ def train_sv(
     where it was, to the same bits.
     """
     pool, aside = pools(dataset_dir, settings, seed)
-    net = start_network("sv", SV_CHANNELS, base_weights("sv", settings, base), seed)
+    net = start_network("sv", base_weights("sv", settings, base), seed)
     batches = SingleBatches(pool, seed, settings.photos_per_step, settings.geometry_share)
     cases = single_cases(aside, seed)
     return _train("sv", net, batches, cases, settings, out, checkpoint, dataset_dir)
@@ -82,7 +86,7 @@ def train_mv(
     """Train the multi-view model; see `train_sv`. From scratch it starts from the shipped
     single-view weights, whose channels it shares."""
     pool, aside = pools(dataset_dir, settings, seed)
-    net = start_network("mv", MV_CHANNELS, base_weights("mv", settings, base), seed)
+    net = start_network("mv", base_weights("mv", settings, base), seed)
     batches = GroupBatches(pool, seed, settings.photos_per_step)
     return _train(
         "mv", net, batches, group_cases(aside, seed), settings, out, checkpoint, dataset_dir
@@ -108,25 +112,26 @@ def pools(dataset_dir: Path, settings: TrainingSettings, seed: int) -> tuple[Cro
     return pool, CropPool.collect(held_out, range(settings.validation_groups), views)
 
 
-def start_network(kind: str, inputs: int, base: Path | None, seed: int) -> LampNet:
+def start_network(kind: str, base: Path | None, seed: int) -> LampNet:
     """The network to train: from `base`, else new; a new multi-view network takes the shipped
     single-view weights for the channels that both have."""
     if base is not None:
         return load_network(base, kind)
     torch.manual_seed(seed)
-    net = LampNet(NetworkShape(inputs, WIDTHS))
+    net = LampNet(SHAPES[kind])
     if kind == "mv" and shipped_weights("sv").is_file():
         widen(load_network(shipped_weights("sv"), "sv"), net)
     return net
 
 
 def widen(narrow: LampNet, wide: LampNet) -> None:
-    """Copy weights of a network with fewer input channels; the further channels start at zero."""
-    block = wide.shape.unshuffle**2
-    weights = narrow.state_dict()
-    stem = torch.zeros_like(wide.stem.weight)
-    stem[:, : narrow.shape.inputs * block] = weights["stem.weight"]
-    wide.load_state_dict({**weights, "stem.weight": stem})
+    """Copy weights of a network with fewer inputs and outputs; the further ones start at zero."""
+    weights = dict(narrow.state_dict())
+    for name in ("stem.weight", "head.weight", "head.bias"):
+        padded = torch.zeros_like(wide.state_dict()[name])
+        padded[tuple(slice(0, size) for size in weights[name].shape)] = weights[name]
+        weights[name] = padded
+    wide.load_state_dict(weights)
 
 
 def single_cases(pool: CropPool, seed: int) -> Cases:

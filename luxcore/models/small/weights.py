@@ -13,10 +13,18 @@ from torch import Tensor
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import atomic_file
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
-from luxcore.models.small.network import LampNet, NetworkShape, channels_last
+from luxcore.models.small.network import (
+    MV_OUTPUTS,
+    SV_OUTPUTS,
+    LampNet,
+    NetworkShape,
+    channels_last,
+)
 
 FORMAT = "lux-small-1"
-CHANNELS = {"sv": SV_CHANNELS, "mv": MV_CHANNELS}
+CHANNELS = {"sv": (SV_CHANNELS, SV_OUTPUTS), "mv": (MV_CHANNELS, MV_OUTPUTS)}
+"""Inputs and outputs that this version builds and understands."""
+
 SHIPPED = Path(__file__).parents[1] / "weights"
 """`sv.safetensors` and `mv.safetensors`, trained by the recipe in docs/models.md."""
 
@@ -54,10 +62,10 @@ def load_network(path: Path, kind: str) -> LampNet:
         net = LampNet(shape)
     except (KeyError, TypeError, ValueError, RuntimeError, ZeroDivisionError) as error:
         raise FormatError(f"{path} describes no usable network: {error}.") from error
-    if shape.inputs != CHANNELS[kind]:
+    if (shape.inputs, shape.outputs) != CHANNELS[kind]:
         raise FormatError(
-            f"{path} was trained on {shape.inputs} input channels, this version has "
-            f"{CHANNELS[kind]}."
+            f"{path} has {shape.inputs} inputs and {shape.outputs} outputs, this version needs "
+            f"{CHANNELS[kind][0]} and {CHANNELS[kind][1]}."
         )
     _check_tensors(path, tensors, net)
     net.load_state_dict({name: tensor.float() for name, tensor in tensors.items()})
