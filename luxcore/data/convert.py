@@ -1,0 +1,67 @@
+"""Between our compact form and the public layout, both ways, and out to nerfstudio."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from luxcore.cameras import camera_to_nerfstudio
+from luxcore.data.compact import load_rendered, read_metadata, save_rendered
+from luxcore.data.crops import LitCrop
+from luxcore.data.public_reader import open_scenes
+from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
+from luxcore.errors import InputError
+from luxcore.files.atomic import atomic_folder, write_json
+from luxcore.files.exr import write_exr
+from luxcore.files.photos import write_png
+from luxcore.light.agx import agx
+from luxcore.progress import progress
+
+
+def compact_to_public(
+    stems: Sequence[Path], root: Path, *, first_scene: int = 0, seed: int = 0
+) -> list[Path]:
+    """One public scene per room, numbered from `first_scene` in the order of `stems`."""
+    rooms: dict[str, list[Path]] = {}
+    for stem in stems:
+        rooms.setdefault(str(read_metadata(stem).get("room")), []).append(stem)
+    scenes = []
+    with progress("public layout", len(rooms), "scenes") as bar:
+        for number, members in enumerate(rooms.values(), start=first_scene):
+            views = [load_rendered(stem) for stem in members]
+            scenes.append(write_scene(root, f"{number:06d}", views, seed=seed))
+            bar.advance()
+    return scenes
+
+
+def public_to_compact(path: Path, out: Path) -> list[Path]:
+    """Every view of the scenes at `path` (shards or folders) as `out`/SSSSSS_V; returns the stems.
+
+    The photo is the mix "as taken" where the scene has it, else the full mix.
+    """
+    stems = []
+    for scene in open_scenes(path):
+        mix = AS_TAKEN_PASS if AS_TAKEN_PASS in scene.mix_passes else 0
+        for view in scene.views:
+            stems.append(Path(out) / f"{scene.scene_id}_{view}")
+            save_rendered(scene.read_view(view, mix), stems[-1])
+    return stems
+
+
+def export_nerfstudio(crops: Sequence[LitCrop], out: Path) -> Path:
+    """Photos with their cameras: `images/0000.png` …, `depth/0000.exr` and `transforms.json`.
+
+    Photos are AgX(exposure · light). Raises InputError where there are none.
+    """
+    if not crops:
+        raise InputError("there are no photos to export.")
+    frames = []
+    with atomic_folder(Path(out)) as folder:
+        for number, crop in enumerate(crops):
+            name = f"images/{number:04d}.png"
+            write_png(folder / name, agx(crop.image_linear * crop.exposure))
+            depth = {"depth_m": crop.depth_m}
+            write_exr(folder / "depth" / f"{number:04d}.exr", depth, half=False)
+            frames.append({"file_path": name, **camera_to_nerfstudio(crop.camera)})
+        write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
+    return Path(out)
