@@ -22,7 +22,10 @@ def base_folder(base: str, components: Sequence[str]) -> Path:
     """The folder that holds `components` (`vae`, `unet` …) of a base.
 
     A hub id is looked up in the local hub cache and fetched when it is not there; with
-    HF_HUB_OFFLINE=1 nothing is fetched. Raises InputError in one sentence when it is nowhere.
+    HF_HUB_OFFLINE=1 nothing is fetched. Callers look here before they import diffusers, which
+    takes seconds: a missing base is said at once.
+
+    Raises InputError in one sentence when it is nowhere, or lacks a component.
     """
     if not base:
         raise InputError("this model needs a base: set base to a local folder or to a hub id.")

@@ -20,9 +20,16 @@ Train = Callable[[Section, Path, Listener], Path]
 
 
 def train_command(
-    name: str, kind: type[Section], train: Train[Section], arguments: Sequence[str]
+    name: str,
+    kind: type[Section],
+    train: Train[Section],
+    arguments: Sequence[str],
+    listen: Callable[[Path], Listener] = FolderListener,
 ) -> int:
-    """`--settings FILE --out DIR`: train, or go on training. Returns the exit status."""
+    """`--settings FILE --out DIR`: train, or go on training. Returns the exit status.
+
+    `listen` makes the listener for the output folder.
+    """
     parser = argparse.ArgumentParser(prog=f"python -m {name}", description=train.__doc__)
     parser.add_argument("--settings", type=Path, required=True, help="YAML file of the settings")
     parser.add_argument(
@@ -31,7 +38,7 @@ def train_command(
     given = parser.parse_args(arguments)
     try:
         settings = read_settings(kind, given.settings)
-        weights = train(settings, given.out, FolderListener(given.out))
+        weights = train(settings, given.out, listen(given.out))
     except LuxError as error:
         print(error, file=sys.stderr)
         return error.exit_code

@@ -31,9 +31,9 @@ class FolderListener:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
 
     def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
         line = json.dumps({"step": step, **values}, sort_keys=True)
         with open(self.folder / "metrics.jsonl", "a", encoding="utf-8") as stream:
             stream.write(line + "\n")

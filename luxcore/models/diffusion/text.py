@@ -16,9 +16,9 @@ TEXT_PARTS = ("text_encoder", "tokenizer")
 @torch.no_grad()
 def clip_sequences(base: str, texts: Sequence[str]) -> Float[Tensor, "b t d"]:
     """Last hidden states of the base's CLIP text encoder, at its full length."""
+    folder = base_folder(base, TEXT_PARTS)
     from transformers import AutoTokenizer, CLIPTextModel
 
-    folder = base_folder(base, TEXT_PARTS)
     encoder = load_component(CLIPTextModel, folder, "text_encoder", torch.float32)
     tokenizer = AutoTokenizer.from_pretrained(folder / "tokenizer", local_files_only=True)
     tokens = tokenizer(

@@ -189,9 +189,9 @@ def encode_prompts(settings: KontextSettings) -> PromptEmbeddings:
 
 
 def _load_kontext(settings: KontextSettings, dtype: torch.dtype, seed: int) -> KontextEditor:
+    folder = base_folder(settings.base, ("transformer", "vae", "scheduler"))
     from diffusers import AutoencoderKL, FlowMatchEulerDiscreteScheduler, FluxTransformer2DModel
 
-    folder = base_folder(settings.base, ("transformer", "vae", "scheduler"))
     transformer = load_component(FluxTransformer2DModel, folder, "transformer", dtype)
     add_lora(transformer, settings.lora_rank, settings.lora_single_out, seed)
     scheduler = FlowMatchEulerDiscreteScheduler.from_pretrained(
@@ -203,9 +203,9 @@ def _load_kontext(settings: KontextSettings, dtype: torch.dtype, seed: int) -> K
 
 
 def _load_sd(settings: KontextSettings) -> LatentUNetEditor:
+    folder = base_folder(settings.base, ("unet", "vae"))
     from diffusers import AutoencoderKL, UNet2DConditionModel
 
-    folder = base_folder(settings.base, ("unet", "vae"))
     unet = load_component(UNet2DConditionModel, folder, "unet", torch.float32)
     module = LatentUNetModule(unet.requires_grad_(True), settings.noise)
     return LatentUNetEditor(module, load_component(AutoencoderKL, folder, "vae", torch.float32))

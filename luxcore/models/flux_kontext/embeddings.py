@@ -68,10 +68,10 @@ def cached_embeddings(path: Path, encode: Callable[[], PromptEmbeddings]) -> Pro
 @torch.no_grad()
 def encode_flux_prompts(base: str, tokens: int) -> PromptEmbeddings:
     """Every instruction through the base's CLIP (pooled) and T5 (sequence of `tokens`)."""
+    folder = base_folder(base, FLUX_TEXT_PARTS)
     from diffusers import FluxKontextPipeline
     from transformers import AutoTokenizer, CLIPTextModel, T5EncoderModel
 
-    folder = base_folder(base, FLUX_TEXT_PARTS)
     pipeline = FluxKontextPipeline(
         scheduler=None,
         vae=None,

@@ -27,14 +27,14 @@ def train_kontext(settings: KontextTraining, out: Path, listener: Listener) -> P
     """Train the paper's single-view model, or go on from the newest checkpoint in the folder."""
     from accelerate import PartialState
 
+    seed = settings.loop.seed
+    examples = EditExamples(open_photos(settings.data, seed), settings.data, seed)
     out.mkdir(parents=True, exist_ok=True)
     with PartialState().main_process_first():
         embeddings = cached_embeddings(out / PROMPTS_FILE, lambda: encode_prompts(settings.model))
-    seed = settings.loop.seed
     editor = load_editor(settings.model, FROZEN_DTYPE[settings.loop.mixed_precision], seed)
     if settings.loop.gradient_checkpointing:
         editor.module.enable_gradient_checkpointing()
-    examples = EditExamples(open_photos(settings.data, seed), settings.data, seed)
     trainee = KontextTrainee(editor, embeddings, examples, settings)
     return train(trainee, settings.phases, settings.loop, out, training_digest(settings), listener)
 

@@ -18,12 +18,12 @@ from luxcore.settings.paper_models import MultiViewTraining
 
 def train_multiview(settings: MultiViewTraining, out: Path, listener: Listener) -> Path:
     """Train the paper's multi-view model, or go on from the newest checkpoint in the folder."""
-    out.mkdir(parents=True, exist_ok=True)
     seed = settings.loop.seed
+    sets = open_sets(settings.data, seed)
+    examples = ViewExamples(sets, settings.data, settings.model, seed)
     model = load_base(settings.model)
     if settings.loop.gradient_checkpointing:
         model.module.unet.enable_gradient_checkpointing()
-    examples = ViewExamples(open_sets(settings.data, seed), settings.data, settings.model, seed)
     trainee = MultiViewTrainee(model, examples, settings)
     return train(trainee, settings.phases, settings.loop, out, training_digest(settings), listener)
 

@@ -58,9 +58,9 @@ def open_multiview(folder: Path, base: str) -> MultiViewModel:
 
 
 def _assembled(settings: MultiViewSettings, context: Tensor | None) -> MultiViewModel:
+    folder = base_folder(settings.base, ("unet", "vae"))
     from diffusers import AutoencoderKL, UNet2DConditionModel
 
-    folder = base_folder(settings.base, ("unet", "vae"))
     unet = load_component(UNet2DConditionModel, folder, "unet", torch.float32)
     vae = load_component(AutoencoderKL, folder, "vae", torch.float32)
     if context is None:
