@@ -25,6 +25,8 @@ def view_job(
         "spp": spp,
         "seed": room.seed * 1009 + number,
         "denoise": settings.denoise,
+        "top_up_noise": settings.top_up_noise,
+        "top_up_factor": settings.top_up_factor,
         "timeout_s": settings.timeout_s,
     }
 

@@ -18,6 +18,12 @@ class RenderSettings(Settings):
     denoise: Literal["off", "fast", "balanced", "high"] = Field(
         "balanced", description="quality of the denoiser, run on every light by itself"
     )
+    top_up_noise: float = Field(
+        1.8, gt=0, description="relative noise above which the worst lamp is rendered once more"
+    )
+    top_up_factor: int = Field(
+        3, ge=1, le=64, description="samples of that second render, in units of spp"
+    )
     demo_views: int = Field(24, ge=2, le=200, description="perspective views of the demo capture")
     demo_width: int = Field(320, ge=32, le=4096, description="columns of a demo view, pixels")
     demo_height: int = Field(240, ge=32, le=4096, description="rows of a demo view, pixels")

@@ -37,11 +37,19 @@ def emitter_material(name: str, radiance: float) -> Any:
     graph.set(power.inputs[0], front.outputs[0])
     graph.set(power.inputs[1], radiance)
     light = graph.node("Emission", Color=(1.0, 1.0, 1.0), Strength=power.outputs[0])
-    matt = graph.node("BsdfDiffuse", Color=(UNLIT_REFLECTANCE,) * 3)
+    matt = graph.matt((UNLIT_REFLECTANCE,) * 3)
     both = graph.tree.nodes.new("ShaderNodeAddShader")
     graph.set(both.inputs[0], light.outputs[0])
     graph.set(both.inputs[1], matt.outputs[0])
     graph.surface(both)
+    return built
+
+
+def matt_material(name: str) -> Any:
+    """What an emitter looks like while its lamp is off."""
+    built = bpy.data.materials.new(name)
+    graph = Graph(built)
+    graph.surface(graph.matt((UNLIT_REFLECTANCE,) * 3))
     return built
 
 

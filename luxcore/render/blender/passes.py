@@ -22,6 +22,8 @@ class Passes:
     """One render. Images are [h, w, 3] float32; linear radiance; normals in the world frame."""
 
     groups: dict[str, np.ndarray]
+    combined: np.ndarray
+    """The renderer's own sum of all groups."""
     albedo: np.ndarray
     normal: np.ndarray
     guide_albedo: np.ndarray
@@ -32,6 +34,13 @@ class Passes:
     """[h, w] object index, 0 for what belongs to no lamp."""
     outside: np.ndarray
     """[h, w] bool: the ray met nothing."""
+
+
+def sum_error(passes: Passes) -> float:
+    """How far Σ groups is from the combined image: largest difference over the largest value."""
+    total = np.sum([g.astype(np.float64) for g in passes.groups.values()], axis=0)
+    peak = float(np.abs(passes.combined).max())
+    return float(np.abs(total - passes.combined).max()) / peak if peak > 0 else 0.0
 
 
 def configure(scene: Any, effects: Effects, *, spp: int, seed: int, threads: int) -> None:
@@ -113,6 +122,7 @@ def _collect(layers: dict[str, np.ndarray], eye: np.ndarray) -> Passes:
     distance = np.linalg.norm(position - eye, axis=2)
     return Passes(
         groups=groups,
+        combined=layers["Combined"][..., :3],
         albedo=np.clip(layers["Diffuse Color"][..., :3], 0, 1),
         normal=_unit(layers["Normal"][..., :3]),
         guide_albedo=layers["Denoising Albedo"][..., :3],

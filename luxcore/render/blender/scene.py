@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from luxcore.cameras import OPENGL_FROM_OPENCV, Camera
+from luxcore.render.blender.lights import LAMP_PROPERTY
 from luxcore.render.blender.materials import build_material, emitter_material
 from luxcore.render.effects import Effects
 from luxcore.render.hdri import hdri_path, mean_luminance
@@ -19,6 +20,10 @@ from luxcore.rooms.model import Environment, Opening, Part, Room, Spot
 AMBIENT_GROUP = "ambient"
 FIXTURE_INDEX, EMITTER_INDEX = 2, 3
 """Object index of lamp i: 10·(i+1) + one of these; everything else has index 0."""
+
+
+OUTSIDE = -1
+"""In place of a lamp's index: a portal of the environment."""
 
 
 def lamp_group(index: int) -> str:
@@ -116,6 +121,8 @@ def _add_part(scene: Any, number: int, part: Part, materials: dict[str, Any]) ->
             EMITTER_INDEX if part.emits > 0 else FIXTURE_INDEX
         )
         holder.lightgroup = lamp_group(part.lamp)
+        if part.emits > 0:
+            holder[LAMP_PROPERTY] = part.lamp
 
 
 def _add_spot(scene: Any, number: int, spot: Spot) -> None:
@@ -130,6 +137,7 @@ def _add_spot(scene: Any, number: int, spot: Spot) -> None:
     holder.location = spot.position
     holder.rotation_euler = _toward(spot.direction)
     holder.lightgroup = lamp_group(spot.lamp)
+    holder[LAMP_PROPERTY] = spot.lamp
 
 
 def _add_portal(scene: Any, number: int, opening: Opening) -> None:
@@ -140,6 +148,7 @@ def _add_portal(scene: Any, number: int, opening: Opening) -> None:
     scene.collection.objects.link(holder)
     holder.location = opening.center
     holder.rotation_euler = _toward((*opening.inward, 0.0))
+    holder[LAMP_PROPERTY] = OUTSIDE
 
 
 def _toward(direction: tuple[float, float, float]) -> Any:
