@@ -1,5 +1,6 @@
 """Photos of a room become cameras, points and undistorted views in one layout."""
 
+from luxcore.capture.export import export_capture
 from luxcore.capture.ingest import ingest, placed_sentence
 from luxcore.capture.points import Points, read_points, write_points
 from luxcore.capture.pose_error import PoseError, pose_error
@@ -13,6 +14,7 @@ __all__ = [
     "PoseError",
     "Skipped",
     "View",
+    "export_capture",
     "from_rendered",
     "ingest",
     "load_capture",

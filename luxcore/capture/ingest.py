@@ -107,10 +107,12 @@ def _check_enough(
 ) -> None:
     if len(staged) >= settings.min_views:
         return
-    unusable = f" and {len(skipped)} unusable ({skipped[0].name}: {skipped[0].reason})"
+    unusable = ""
+    if skipped:
+        unusable = f" and {len(skipped)} unusable ({skipped[0].name}: {skipped[0].reason})"
     raise InputError(
-        f"{source} holds {len(staged)} readable photo{'s' * (len(staged) != 1)}"
-        f"{unusable if skipped else ''}; at least {settings.min_views} are needed."
+        f"{source} holds {len(staged)} readable photo{'s' * (len(staged) != 1)}{unusable}; "
+        f"at least {settings.min_views} are needed."
     )
 
 

@@ -13,7 +13,7 @@ MEDIAN_DEPTH = 3.0
 EYE_HEIGHT = 1.5
 """z of the mean camera, as if a person had held it."""
 
-_MEAN_UP_WEIGHT = 0.1
+_MEAN_UP_WEIGHT = 0.02
 """Small: camera x axes decide where the cameras turned, the mean up axis where they did not."""
 
 
