@@ -3,10 +3,11 @@
 // Front to back again, with the same alphas. With s_i = f_i . d_features + d_alpha and
 // R_i = sum_{j>i} w_j s_j, known from the forward image,
 //   h_i = dL/d ln(alpha_i) = w_i s_i - R_i alpha_i / (1 - alpha_i),
-// so nothing divides the transmittance back. Each (Gaussian, tile) pair writes its own slot:
-// the moments of h (see projection_backward.cl), then dL/d features. No atomics.
-// touched[slot] must be 0 before; slots of Gaussians behind finished pixels stay untouched.
-// Compile-time: CHANNELS, WITH_DEPTH, SLOT_SIZE, CHUNK and the constants of blending.cl.
+// so nothing divides the transmittance back. Each (Gaussian, tile) pair writes its own row of
+// partials, in the order of the sorted lists: the moments of h (see projection_backward.cl), then
+// dL/d features. No atomics. touched[row] must be 0 before; rows of Gaussians that no open pixel
+// sees stay untouched.
+// Compile-time: CHANNELS, WITH_DEPTH, PARTIAL_SIZE, CHUNK and the constants of blending.cl.
 #define FEATURES (CHANNELS + WITH_DEPTH)
 #define MOMENTS 6
 #define SUMS (MOMENTS + FEATURES)
@@ -96,11 +97,11 @@ void read_block(Block *block, const int x0, const int y0, const int2 size,
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
     const int2 size, const int tiles_x, __global const int2 *ranges,
-    __global const int *sorted_ids, __global const int *sorted_slots,
+    __global const int *sorted_ids,
     __global const float *records, __global const float *colors, __global const int *used,
     __global const float *image, __global const float *alpha, __global const float *depth,
     __global const float *d_image, __global const float *d_alpha, __global const float *d_depth,
-    __global float *slots, __global uchar *touched) {
+    __global float *partials, __global uchar *touched) {
   const int tile = get_global_id(0);
   const int x0 = (tile % tiles_x) * TILE, y0 = (tile / tiles_x) * TILE;
   const int end = ranges[tile].x + used[tile];
@@ -109,6 +110,11 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
   for (int b = 0; b < BLOCKS; ++b)
     read_block(&blocks[b], x0 + (b & 3) * 4, y0 + (b >> 2) * 4, size, image, alpha, depth, d_image,
                d_alpha, d_depth);
+  float16 px[4], py[4];  // pixel centres of a column and of a row of blocks
+  for (int k = 0; k < 4; ++k) {
+    px[k] = x0 + 4 * k + 0.5f + LANE_X;
+    py[k] = y0 + 4 * k + 0.5f + LANE_Y;
+  }
   int open = 0xffff;  // bit b: block b has unfinished pixels
   for (int begin = ranges[tile].x; begin < end; begin += CHUNK) {
     const int count = min(CHUNK, end - begin);
@@ -123,17 +129,16 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
       for (; left; left &= left - 1) {
         const int b = popcount(~left & (left - 1));
         blend_backward(&blocks[b], r, chunk.features + i * FEATURES,
-                       (x0 + (b & 3) * 4 + 0.5f) + LANE_X, (y0 + (b >> 2) * 4 + 0.5f) + LANE_Y,
-                       sums);
+                       px[b & 3], py[b >> 2], sums);
       }
-      const int slot = sorted_slots[begin + i];
-      touched[slot] = 1;
+      const int row = begin + i;
+      touched[row] = 1;
       float total[SUM_VECTORS * 16];
 #pragma unroll
       for (int k = 0; k < SUM_VECTORS; ++k) vstore16(sum_lanes(sums + 16 * k), k, total);
 #pragma unroll
-      for (int k = 0; k < SLOT_SIZE / 4; ++k)
-        vstore4(vload4(k, total), 0, slots + (size_t)slot * SLOT_SIZE + 4 * k);
+      for (int k = 0; k < PARTIAL_SIZE / 4; ++k)
+        vstore4(vload4(k, total), 0, partials + (size_t)row * PARTIAL_SIZE + 4 * k);
     }
     for (int b = 0; b < BLOCKS; ++b)
       if (!any(blocks[b].T > 0.0f)) open &= ~(1 << b);

@@ -68,7 +68,7 @@ __kernel void count_pairs(const int n, __global const int *order, __global const
   part_pairs[part] = sum;
 }
 
-// Slots are handed out in depth order: Gaussian g owns slots[offsets[g] .. + tile_counts[g]).
+// Slots are handed out in depth order: Gaussian g owns offsets[g] .. offsets[g] + tile_counts[g].
 __kernel void list_tiles(const int n, const int tiles, const int2 size, __global const int *order,
                          __global const int *tile_counts, __global const ulong *part_pairs,
                          __global const float *records, __global int *offsets,
@@ -106,7 +106,7 @@ __kernel void find_ranges(const int tiles, const int pairs, __global const int *
 __kernel void move_to_tiles(const int n, const int tiles, __global const int *order,
                             __global const int *tile_counts, __global const int *offsets,
                             __global const int *slot_tiles, __global int *table,
-                            __global int *sorted_ids, __global int *sorted_slots) {
+                            __global int *sorted_ids, __global int *slot_positions) {
   const int part = get_global_id(0);
   const int2 range = part_range(n, part);
   __global int *next = table + (size_t)part * tiles;
@@ -115,7 +115,7 @@ __kernel void move_to_tiles(const int n, const int tiles, __global const int *or
     for (int slot = begin; slot < end; ++slot) {
       const int to = next[slot_tiles[slot]]++;
       sorted_ids[to] = g;
-      sorted_slots[to] = slot;
+      slot_positions[slot] = to;
     }
   }
 }

@@ -1,4 +1,4 @@
-"""Which Gaussians each tile blends, in the order (depth, index), all on the device (kernels/sort.cl).
+"""Which Gaussians each tile blends, in the order (depth, index): kernels/sort.cl.
 
 Gaussians are sorted by depth once, then dealt to tiles by a counting sort. Both are stable.
 """
@@ -31,8 +31,10 @@ class TileLists:
     """[tiles, 2] first and end position of each tile, rows of tiles from the top left."""
     sorted_ids: cla.Array
     """[pairs] Gaussian at each position."""
-    sorted_slots: cla.Array
-    """[pairs] gradient slot of each position; a Gaussian's slots are contiguous."""
+    slot_positions: cla.Array
+    """[pairs] position of each slot; a Gaussian's slots are contiguous, in the order of tiles."""
+    order: cla.Array
+    """[n] Gaussians by depth, ties by index."""
     offsets: cla.Array
     """[n] first slot of each Gaussian."""
     counts: cla.Array
@@ -63,7 +65,7 @@ class Binning:
         Raises LuxError when there are more than `config.max_intersections` pairs.
         """
         device, kernels, n = self.device, self._kernels, int(records.shape[0])
-        columns, tiles = tile_grid(camera)
+        _, tiles = tile_grid(camera)
         size = np.array([camera.width, camera.height], np.int32)
         order = self._depth_order(depth_keys)
         part_pairs = device.empty((self.parts,), np.uint64)
@@ -78,12 +80,12 @@ class Binning:
         self._scan(table, tiles)
         ranges = device.empty((tiles, 2), np.int32)
         device.launch(kernels.find_ranges, tiles, tiles, pairs, table, ranges, group=64)
-        ids, slots = self._ints(pairs), self._ints(pairs)
+        ids, positions = self._ints(pairs), self._ints(pairs)
         device.launch(
             kernels.move_to_tiles, self.parts, n, tiles, order, tile_counts, offsets, slot_tiles,
-            table, ids, slots, group=1,
+            table, ids, positions, group=1,
         )  # fmt: skip
-        return TileLists(ranges, ids, slots, offsets, tile_counts, pairs)
+        return TileLists(ranges, ids, positions, order, offsets, tile_counts, pairs)
 
     def _depth_order(self, keys: cla.Array) -> cla.Array:
         """Indices by ascending key, ties by index (radix sort, least significant digit first)."""

@@ -59,19 +59,19 @@ class Blending:
         device, lists, with_depth = self.device, out.saved.lists, d_depth is not None
         columns, tiles = tile_grid(out.camera)
         n, pairs = out.inputs.count, max(lists.pairs, 1)
-        slots = device.empty((pairs, self.config.slot_size(with_depth)))
+        partials = device.empty((pairs, self.config.partial_size(with_depth)))
         touched = device.zeros((pairs,), np.uint8)
         device.launch(
             self._program("backward", with_depth).raster_backward, tiles * self._group,
-            _size(out.camera), columns, lists.ranges, lists.sorted_ids, lists.sorted_slots,
-            out.saved.records, out.inputs.colors, out.saved.used, out.image, out.alpha, out.depth,
-            d_image, d_alpha, d_depth, slots, touched, group=self._group,
+            _size(out.camera), columns, lists.ranges, lists.sorted_ids, out.saved.records, out.inputs.colors, out.saved.used, out.image, out.alpha, out.depth,
+            d_image, d_alpha, d_depth, partials, touched, group=self._group,
         )  # fmt: skip
         moments, d_colors = device.empty((n, 8)), device.empty((n, self.config.channels))
-        gather = device.program("gather_slots", self._defines(with_depth)).gather_slots
+        gather = device.program("gather_partials", self._defines(with_depth)).gather_partials
         device.launch(
-            gather, n, n, lists.offsets, lists.counts, slots, touched, moments, d_colors, group=64
-        )
+            gather, n, n, lists.order, lists.offsets, lists.counts, lists.slot_positions, partials,
+            touched, moments, d_colors, group=64,
+        )  # fmt: skip
         return moments, d_colors
 
     def _program(self, direction: str, with_depth: bool) -> Kernels:
@@ -82,7 +82,7 @@ class Blending:
         return self.config.defines() | {
             "CHUNK": CHUNK[self.device.mapping],
             "WITH_DEPTH": with_depth,
-            "SLOT_SIZE": self.config.slot_size(with_depth),
+            "PARTIAL_SIZE": self.config.partial_size(with_depth),
         }
 
 

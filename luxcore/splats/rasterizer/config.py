@@ -58,6 +58,6 @@ class RasterConfig:
             "EPS2D": self.eps2d,
         }
 
-    def slot_size(self, with_depth: bool) -> int:
-        """Floats of one gradient slot: moments, colours and depth, rounded up to whole float4."""
+    def partial_size(self, with_depth: bool) -> int:
+        """Floats of one row of partial gradients: moments, colours and depth, rounded up to whole float4."""
         return -(-(MOMENTS + self.channels + with_depth) // 4) * 4

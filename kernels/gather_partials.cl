@@ -1,0 +1,36 @@
+// Sums the partial gradients of each Gaussian, in the order of its slots: the same bits on any number
+// of threads.
+//
+// One work-item per Gaussian in depth order, n of them. A row of partials holds 6 moments, CHANNELS
+// colours and, WITH_DEPTH, the depth. Compile-time: CHANNELS, WITH_DEPTH, PARTIAL_SIZE (a multiple
+// of 4).
+#line 8 "gather_partials.cl"
+
+#define MOMENTS 6
+
+__kernel void gather_partials(const int n, __global const int *order, __global const int *offsets,
+                              __global const int *tile_counts,
+                              __global const int *slot_positions, __global const float *partials,
+                              __global const uchar *touched, __global float *moments,
+                              __global float *d_colors) {
+  const int k = get_global_id(0);
+  if (k >= n) return;
+  const int i = order[k];
+  float4 sum[PARTIAL_SIZE / 4];
+#pragma unroll
+  for (int v = 0; v < PARTIAL_SIZE / 4; ++v) sum[v] = (float4)(0.0f);
+  const int end = offsets[i] + tile_counts[i];
+  for (int slot = offsets[i]; slot < end; ++slot) {
+    const int row = slot_positions[slot];
+    if (!touched[row]) continue;
+#pragma unroll
+    for (int v = 0; v < PARTIAL_SIZE / 4; ++v)
+      sum[v] += vload4(v, partials + (size_t)row * PARTIAL_SIZE);
+  }
+  float values[PARTIAL_SIZE];
+#pragma unroll
+  for (int v = 0; v < PARTIAL_SIZE / 4; ++v) vstore4(sum[v], v, values);
+  for (int m = 0; m < MOMENTS; ++m) moments[(size_t)i * 8 + m] = values[m];
+  moments[(size_t)i * 8 + MOMENTS] = WITH_DEPTH ? values[MOMENTS + CHANNELS] : 0.0f;
+  for (int c = 0; c < CHANNELS; ++c) d_colors[(size_t)i * CHANNELS + c] = values[MOMENTS + c];
+}
