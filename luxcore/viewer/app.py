@@ -7,7 +7,6 @@ are asked for through latest-wins queues, so that no stale frame is ever drawn.
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable, Hashable
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -16,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from luxcore.cameras import Camera
-from luxcore.errors import InputError, LuxError
+from luxcore.errors import LuxError
+from luxcore.ports import check_port
 from luxcore.splats.relighting import mixing_weights
 from luxcore.splats.scene import Scene
 from luxcore.viewer.cameras import camera_of_browser, place_browser
@@ -143,13 +143,3 @@ def _depth(viewed: ViewedScene) -> float:
     camera = viewed.cameras[0]
     middle = viewed.scene.gaussians.means.mean(axis=0)
     return max(0.1, float((middle - camera.centre) @ camera.c2w[:3, 2]))
-
-
-def check_port(host: str, port: int) -> None:
-    """Raises InputError when `port` cannot be had; viser would silently take another one."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            raise InputError(f"port {port} on {host} cannot be used: {error}.") from error
