@@ -15,7 +15,13 @@ from luxcore.files.atomic import atomic_file
 MAX_SIDE = 32_768
 """Largest width or height, in pixels, that a header may claim before anything is allocated."""
 
+MAX_PARTS, MAX_CHANNELS = 256, 64
+MAX_EXPANSION = 1_100
+"""Most bytes of pixels per byte of file: zlib, the tightest of the codecs, cannot pass 1,032."""
+
 HALF_MAX = 65_504.0
+_HALF_ZERO = 2.0**-25
+"""Half precision rounds this and everything smaller to 0."""
 _RGB = {1: "Y", 3: "RGB", 4: "RGBA"}
 
 
@@ -32,7 +38,7 @@ def _library() -> Any:
 def write_exr(path: Path, layers: Mapping[str, np.ndarray], *, half: bool = True) -> int:
     """Write each layer ([H, W] or [H, W, 1|3|4]) as one part; ZIP, half or float32.
 
-    Returns the number of values that half precision had to clip to ±65504.
+    Returns the number of values that half precision had to clip to ±65504 or let vanish to 0.
     Depth-like layers that must not lose precision: pass float64 arrays' layers with `half=False`.
     Raises InputError when a layer is empty, not finite, or of a different size than the others.
     """
@@ -44,7 +50,9 @@ def write_exr(path: Path, layers: Mapping[str, np.ndarray], *, half: bool = True
         _check_layer(path, name, pixels, size)
         size = pixels.shape[:2]
         if half:
-            clipped += int(np.count_nonzero(np.abs(pixels) > HALF_MAX))
+            size_of = np.abs(pixels)
+            lost = (size_of > HALF_MAX) | ((size_of > 0) & (size_of <= _HALF_ZERO))
+            clipped += int(np.count_nonzero(lost))
             pixels = np.clip(pixels, -HALF_MAX, HALF_MAX).astype(np.float16)
         channels = {
             c: np.ascontiguousarray(pixels[..., i]) for i, c in enumerate(_RGB[pixels.shape[2]])
@@ -58,22 +66,29 @@ def write_exr(path: Path, layers: Mapping[str, np.ndarray], *, half: bool = True
     return clipped
 
 
-def read_exr(path: Path) -> dict[str, np.ndarray]:
+def read_exr(path: Path, *, finite: bool = True) -> dict[str, np.ndarray]:
     """Layers by part name, each [H, W, C] float32, C in 1, 3, 4 (channels R, G, B, A or Y first).
 
-    A single unnamed part is called "image". Raises FormatError naming the file and the fact.
+    A single unnamed part is called "image"; what is read is the data window, wherever it lies in
+    the display window. With `finite`, NaN and infinity are damage. Raises InputError (missing) or
+    FormatError, naming the file and the fact, before memory is taken for what a header claims.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     try:
-        file = _library().File(str(path), separate_channels=True)
-        parts = list(file.parts)
+        _check_header(path)
+        parts = list(_library().File(str(path), separate_channels=True).parts)
         layers = {(p.name() or "image"): _part_pixels(path, p) for p in parts}
-    except (RuntimeError, ValueError, IndexError, MemoryError) as error:
-        raise FormatError(f"{path} is not a readable OpenEXR image: {error}.") from error
+    except (RuntimeError, ValueError, IndexError, MemoryError, UnicodeDecodeError) as error:
+        fact = " ".join(str(error).split())
+        raise FormatError(f"{path} is not a readable OpenEXR image: {fact}.") from error
     if not layers:
         raise FormatError(f"{path} is truncated or damaged: it holds no readable part.")
+    if len(layers) != len(parts):
+        raise FormatError(f"{path} holds two parts of the same name.")
+    if finite:
+        _check_finite(path, layers)
     return layers
 
 
@@ -81,6 +96,38 @@ def read_exr_image(path: Path) -> np.ndarray:
     """The first layer of an EXR as [H, W, 3] float32 linear radiance."""
     pixels = next(iter(read_exr(path).values()))
     return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
+
+
+def _check_header(path: Path) -> None:
+    """Refuse what the header alone shows to be hostile. Raises FormatError."""
+    exr = _library()
+    headers = [part.header for part in exr.File(str(path), header_only=True).parts]
+    if len(headers) > MAX_PARTS:
+        raise FormatError(f"{path} claims {len(headers)} parts, too many.")
+    claimed = 0
+    for header in headers:
+        if header.get("type") not in (exr.scanlineimage, exr.tiledimage):
+            raise FormatError(f"{path} is a deep image, which is not supported.")
+        low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
+        width, height = (int(n) for n in high - low + 1)
+        if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+            raise FormatError(f"{path} claims {width}x{height} pixels, which cannot be used.")
+        channels = header["channels"]
+        if len(channels) > MAX_CHANNELS:
+            raise FormatError(f"{path} claims {len(channels)} channels, too many.")
+        if any(c.xSampling != 1 or c.ySampling != 1 for c in channels):
+            raise FormatError(f"{path} has subsampled channels, which are not supported.")
+        claimed += 4 * width * height * len(channels)
+    size = path.stat().st_size
+    if claimed > MAX_EXPANSION * size:
+        raise FormatError(f"{path} has {size} bytes and claims pixels of {claimed} bytes.")
+
+
+def _check_finite(path: Path, layers: Mapping[str, np.ndarray]) -> None:
+    for name, pixels in layers.items():
+        bad = int(np.count_nonzero(~np.isfinite(pixels)))
+        if bad:
+            raise FormatError(f"{path}: layer {name} has {bad} values that are not finite.")
 
 
 def _part_pixels(path: Path, part: Any) -> np.ndarray:
