@@ -58,14 +58,23 @@ def artifacts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     curve = [
         {"iteration": i, "seconds": i * 0.1, "psnr_heldout": 15 + i / 50} for i in (0, 50, 100)
     ]
-    write_json(root / "splat" / "demo" / "curve.json", curve)
     write_json(root / "relight" / "demo" / "metrics.json", {"psnr": 27.25, "gaussians": 1000})
     write_json(root / "evaluate" / "metrics.json", {"sv_psnr": 21.5})
-    write_json(root / "evaluate" / "tables" / "sv.json", [{"method": "copy", "psnr": 14.25}])
+    row = {
+        "method": "copy",
+        "cases": "lamp on",
+        "count": 8,
+        "scores": {"psnr": 14.25, "lpips": None},
+    }
+    table = {"title": "Single-view", "rows": [row], "paper": {"SD": [27.13]}, "notes": ["Ours."]}
+    write_json(root / "evaluate" / "tables" / "sv.json", table)
     write_json(
         root / "train_sv" / "curve.json", [{"step": s, "loss": 1 / (s + 1)} for s in range(5)]
     )
-    write_json(root / "timings" / "splat.json", {"wall_s": 12.5, "peak_memory_mb": 300.0})
+    write_json(
+        root / "timings" / "splat.json",
+        {"wall_s": 12.5, "peak_memory_mb": 300.0, "curve_demo": curve},
+    )
     for room in range(2):
         _write_room(root, room)
     return root

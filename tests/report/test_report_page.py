@@ -75,6 +75,12 @@ def test_figures_carry_their_provenance(report: Path) -> None:
     assert "method debevec" in text
 
 
+def test_tables_show_missing_scores_and_the_papers_figures(report: Path) -> None:
+    text = report.read_text()
+    assert "<td>copy</td><td>lamp on</td><td>8</td><td>14.25</td><td>–</td>" in text
+    assert "<td>paper: SD</td><td>its own rooms</td><td></td><td>27.13</td><td></td>" in text
+
+
 def test_the_worst_case_leads_the_failures(report: Path) -> None:
     failures = report.read_text().split('id="failures"')[1].split("</section>")[0]
     assert "failure-demo-light_01-0003-truth.jpg" in failures

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from luxcore.light.agx import agx
+from luxcore.metrics.image import psnr
+from luxcore.metrics.rescale import channel_scale
 from luxcore.report.content import Picture, Section, Strip, Table
 from luxcore.report.gallery import Gallery
 from luxcore.report.sources import CaptureFiles, find_captures, light_names
@@ -56,22 +58,11 @@ def _cases(capture: CaptureFiles, view: int) -> list[Case]:
     for light in light_names(truth):
         # A lamp that the proposals missed has no estimate: the masks chapter shows that.
         if light in estimate and estimate[light].shape == truth[light].shape:
-            scaled = _rescale(estimate[light], truth[light])
-            psnr = _psnr(agx(capture.exposure * scaled), agx(capture.exposure * truth[light]))
-            cases.append(Case(capture, view, light, psnr, scaled, truth[light]))
+            factor = channel_scale(estimate[light], truth[light]).astype(np.float32)
+            scaled = estimate[light] * factor
+            score = psnr(agx(capture.exposure * scaled), agx(capture.exposure * truth[light]))
+            cases.append(Case(capture, view, light, score, scaled, truth[light]))
     return cases
-
-
-def _rescale(estimate: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Least squares per channel in linear light; a black channel stays as it is."""
-    energy = (estimate.astype(np.float64) ** 2).sum((0, 1))
-    match = (estimate.astype(np.float64) * truth).sum((0, 1))
-    factor = np.where(energy > 0, match / np.maximum(energy, 1e-30), 1.0)
-    return estimate * factor.astype(np.float32)
-
-
-def _psnr(a: np.ndarray, b: np.ndarray) -> float:
-    return float(-10 * np.log10(max(float(np.mean((a - b) ** 2)), 1e-10)))
 
 
 def _table(worst: list[Case]) -> Table:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from luxcore.evaluate.table import COLUMNS, HEADINGS
 from luxcore.report.content import Section, Strip, Table, number
 from luxcore.report.gallery import Gallery
 from luxcore.report.sources import read_json
@@ -15,7 +16,7 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     folder = artifacts / "evaluate"
     blocks: list[Strip | Table] = []
     for path in sorted((folder / "tables").glob("*.json")):
-        table = _table(_title(path), read_json(path))
+        table = _table(path.stem, read_json(path))
         if table:
             blocks.append(table)
     pictures = tuple(
@@ -37,21 +38,29 @@ def _title(path: Path) -> str:
     return path.stem.replace("_", " ")
 
 
-def _table(title: str, data: Any) -> Table | None:
-    """A list of records, or {row name: {column: value}}."""
-    if isinstance(data, dict) and isinstance(data.get("rows"), list):
-        data = data["rows"]
-    if isinstance(data, dict):
-        data = [{"": name, **row} for name, row in data.items() if isinstance(row, dict)]
-    records = [row for row in data or [] if isinstance(row, dict)]
-    if not records:
+def _table(stem: str, data: dict[str, Any]) -> Table | None:
+    """A table of the evaluation: {"title", "rows": [{method, cases, count, scores}], "paper"}."""
+    rows = data.get("rows") or []
+    if not rows:
         return None
-    columns = tuple(dict.fromkeys(name for row in records for name in row))
-    rows = tuple(tuple(_cell(row.get(name)) for name in columns) for row in records)
-    return Table(title, "evaluate", tuple(c.replace("_", " ") for c in columns), rows)
+    names = tuple(name for name in COLUMNS if any(name in row["scores"] for row in rows))
+    ours = [
+        (row["method"], row["cases"], str(row["count"]), *(_cell(row["scores"], n) for n in names))
+        for row in rows
+    ]
+    papers = [
+        (f"paper: {method}", "its own rooms", "", *_padded([number(v) for v in scores], len(names)))
+        for method, scores in data.get("paper", {}).items()
+    ]
+    columns = ("method", "cases", "n", *(HEADINGS[COLUMNS.index(name)] for name in names))
+    note = " ".join(line.lstrip("- ") for line in data.get("notes", []) if line)
+    return Table(str(data.get("title", stem)), "evaluate", columns, (*ours, *papers), note)
 
 
-def _cell(value: Any) -> str:
-    if value is None:
-        return "–"
-    return number(value) if isinstance(value, (int, float)) else str(value)
+def _cell(scores: dict[str, float | None], name: str) -> str:
+    value = scores.get(name)
+    return "–" if value is None else number(value)
+
+
+def _padded(cells: list[str], width: int) -> list[str]:
+    return [*cells, *[""] * (width - len(cells))]

@@ -17,7 +17,7 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     """Curves of held-out quality against time, depth maps, metrics and lamp thumbnails."""
     captures = find_captures(artifacts)
     blocks: list[Strip | Table] = []
-    curve = _curve(captures, gallery)
+    curve = _curve(artifacts, captures, gallery)
     if curve:
         blocks.append(curve)
     for capture in captures:
@@ -34,20 +34,20 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     return Section("Splats", "splats", intro, tuple(blocks))
 
 
-def _curve(captures: list[CaptureFiles], gallery: Gallery) -> Strip | None:
+def _curve(artifacts: Path, captures: list[CaptureFiles], gallery: Gallery) -> Strip | None:
+    timings = read_json(artifacts / "timings" / "splat.json") or {}
     series = {}
     for capture in captures:
-        points = read_json(capture.folder("splat") / "curve.json") or []
-        points = [p for p in points if p.get("psnr_heldout") is not None]
+        points = timings.get(f"curve_{capture.id}") or []
         if points:
-            x = "seconds" if all("seconds" in p for p in points) else "iteration"
-            series[capture.id] = ([p[x] for p in points], [p["psnr_heldout"] for p in points])
+            series[capture.id] = (
+                [point["seconds"] for point in points],
+                [point["psnr_heldout"] for point in points],
+            )
     if not series:
         return None
-    label = "time, s" if x == "seconds" else "iteration"
-    picture = gallery.curves(
-        "splat-curve", series, (label, "PSNR of held-out views, dB"), "stage 1, one line a capture"
-    )
+    axes = ("time, s", "PSNR of held-out views, dB")
+    picture = gallery.curves("splat-curve", series, axes, "stage 1, one line a capture")
     return Strip("How fast geometry is found", "splat", (picture,))
 
 
