@@ -57,13 +57,19 @@ def decompose_photo(
 def solved_scale(
     exposed: Float[np.ndarray, "h w 3"], light: Decomposition, on: Bool[np.ndarray, " k"]
 ) -> Float[np.ndarray, "k 3"]:
-    """RGB factors c of the burning lamps that best rebuild the photo; 0 for the others."""
+    """RGB factors c of the burning lamps that best rebuild the photo; 0 for the others.
+
+    A model whose lights add up already (the small one) has factors of its own; those stay when
+    they rebuild the photo at least as well as the solved ones.
+    """
     from luxcore.light.scale_factors import solve
 
-    scale = np.zeros((len(on), 3), np.float32)
-    if on.any():
-        scale[on] = solve(exposed, light.ambient, light.olat[on])
-    return scale
+    if not on.any():
+        return np.zeros((len(on), 3), np.float32)
+    solved = np.zeros((len(on), 3), np.float32)
+    solved[on] = solve(exposed, light.ambient, light.olat[on])
+    own = recomposition_db(exposed, light)
+    return solved if recomposition_db(exposed, replace(light, scale=solved)) > own else light.scale
 
 
 def recomposition_db(exposed: Float[np.ndarray, "h w 3"], light: Decomposition) -> float:

@@ -41,29 +41,26 @@ def keep_out_of_emitters(
     emitters: Bool[Tensor, "k h w"],
     on: Bool[Tensor, " k"],
 ) -> tuple[Float[Tensor, "k 3 h w"], Float[Tensor, "3 h w"]]:
-    """Lights and ambient with foreign light inside emitters held at its surroundings.
+    """Lights and ambient with foreign light inside burning emitters held at its surroundings.
 
-    What a burning lamp or the ambient loses inside a burning lamp's emitter, that lamp gains: the
-    sum of the photo's light does not change. Light of a lamp that is off just goes.
+    What a burning lamp or the ambient loses there, the emitter's owner gains: the sum of the
+    photo's light does not change. Light of a lamp that is off was not in the photo: it just goes.
     """
     lights, ambient = lights.clone(), ambient.clone()
     for owner in range(len(lights)):
-        window = _window(emitters[owner])
+        window = _window(emitters[owner]) if bool(on[owner]) else None
         if window is None:
             continue
         rows, columns, ring = window
+        part = (slice(None), rows, columns)
+        # Where two masks overlap, the first owns the pixel.
         inside = emitters[owner, rows, columns] & ~emitters[:owner, rows, columns].any(0)
-        for index in [*(k for k in range(len(lights)) if k != owner), len(lights)]:
-            light = ambient if index == len(lights) else lights[index]
-            # An unlit lamp of the photo says nothing about ambient light on its shade.
-            if index == len(lights) and not bool(on[owner]):
-                continue
-            excess = _capped(
-                light[:, rows, columns], inside, ring & ~emitters[:, rows, columns].any(0)
-            )
-            gives = bool(on[owner]) and (index == len(lights) or bool(on[index]))
-            if gives:
-                lights[owner, :, rows, columns] += excess
+        ring &= ~emitters[:, rows, columns].any(0)
+        for other in range(len(lights)):
+            if other != owner:
+                excess = _capped(lights[other][part], inside, ring)
+                lights[owner][part] += excess * on[other]
+        lights[owner][part] += _capped(ambient[part], inside, ring)
     return lights, ambient
 
 

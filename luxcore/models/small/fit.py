@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -20,6 +20,7 @@ from luxcore.models.small.network import LampNet, channels_last
 from luxcore.progress import progress
 
 
+@runtime_checkable
 class Batches(Protocol):
     """Examples by step, with the features that the network reads; pure functions of the number."""
 
@@ -102,7 +103,8 @@ class _Fit:
         self.optimizer.step()
         self._average()
         self.step, self.lamps = self.step + 1, self.lamps + len(features)
-        self.loss = float(loss) if math.isnan(self.loss) else 0.98 * self.loss + 0.02 * float(loss)
+        now = float(loss.detach())
+        self.loss = now if math.isnan(self.loss) else 0.98 * self.loss + 0.02 * now
         return self.loss
 
     def check(self) -> None:
@@ -111,8 +113,8 @@ class _Fit:
         averaged = channels_last(LampNet(shape))
         averaged.load_state_dict(self.ema)
         row = {
-            "step": self.step,
-            "lamps_seen": self.lamps,
+            "step": float(self.step),
+            "lamps_seen": float(self.lamps),
             "loss": self.loss,
             "psnr_validation": self.validate(averaged.eval()),
         }

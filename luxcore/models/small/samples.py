@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from luxcore.data.crops import LitCrop
 from luxcore.data.lighting import draw_relighting, exposed
 
 
+@runtime_checkable
 class GroupSource(Protocol):
     """Overlapping photos of one room by number, as `luxcore.data.multiview.MultiViewSets` gives."""
 

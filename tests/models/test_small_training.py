@@ -1,0 +1,144 @@
+"""Training: pure batches, exact resume, never worse than the base."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from luxcore.errors import DivergedError
+from luxcore.models.small.batches import GroupBatches, SingleBatches
+from luxcore.models.small.fit import FitSettings, fit, schedule
+from luxcore.models.small.heads import light_fields
+from luxcore.models.small.losses import example_loss
+from luxcore.models.small.network import LampNet, NetworkShape
+from luxcore.models.small.samples import CropPool
+from luxcore.models.small.scores import mean_psnr
+from luxcore.models.small.sketch import SketchRooms
+from luxcore.models.small.training import group_cases, single_cases, widen
+from luxcore.models.small.weights import CHANNELS
+from tests.models.sketched import TINY
+
+SETTINGS = FitSettings(steps=6, rate=1e-3, warmup=2, check_every=3)
+
+
+@pytest.fixture(scope="module")
+def pool() -> CropPool:
+    return CropPool.collect(SketchRooms(1000, 32, 0), range(3), 2)
+
+
+def tiny(kind: str) -> LampNet:
+    torch.manual_seed(0)
+    return LampNet(NetworkShape(*CHANNELS[kind], TINY))
+
+
+def trained(pool: CropPool, settings: FitSettings, checkpoint: Path | None = None) -> dict:
+    score = single_cases(pool, 0)
+    batches = SingleBatches(pool, 5, photos=2)
+    return fit(tiny("sv"), batches, settings, lambda n: mean_psnr(n, score), checkpoint).weights
+
+
+def test_sketched_rooms_are_the_same_every_time_and_differ_by_number() -> None:
+    first, again = SketchRooms(1000, 32, 0).crops(4, 1), SketchRooms(1000, 32, 0).crops(4, 1)
+    other = SketchRooms(1000, 32, 0).crops(5, 1)
+    np.testing.assert_array_equal(first[0].lights, again[0].lights)
+    assert not np.array_equal(first[0].depth_m, other[0].depth_m)
+
+
+def test_sketched_light_is_finite_positive_and_falls_off() -> None:
+    for number in range(6):
+        crop = SketchRooms(1000, 32, 0).crops(number, 1)[0]
+        assert np.isfinite(crop.lights).all()
+        assert (crop.lights >= 0).all()
+        assert (crop.depth_m > 0).all()
+        np.testing.assert_allclose(np.linalg.norm(crop.normal, axis=2), 1, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", [SingleBatches, GroupBatches])
+def test_a_batch_depends_on_its_number_only(kind: type, pool: CropPool) -> None:
+    batches = kind(pool, 5, photos=2)
+    batches.batch(0)
+    first, again = batches.batch(3), kind(pool, 5, photos=2).batch(3)
+    for (a, _), (b, _) in zip(first, again, strict=True):
+        torch.testing.assert_close(a, b, rtol=0, atol=0)
+    assert not torch.equal(first[0][0], batches.batch(4)[0][0])
+
+
+def test_resume_equals_an_unbroken_run(pool: CropPool, tmp_path: Path) -> None:
+    checkpoint = tmp_path / "state.ckpt"
+    whole = trained(pool, SETTINGS)
+
+    class StopError(Exception):
+        pass
+
+    score = single_cases(pool, 0)
+    calls: list[int] = []
+
+    def stop_at_second_check(net: LampNet) -> float:
+        calls.append(1)
+        if len(calls) == 2:
+            raise StopError
+        return mean_psnr(net, score)
+
+    with pytest.raises(StopError):
+        batches = SingleBatches(pool, 5, photos=2)
+        fit(tiny("sv"), batches, SETTINGS, stop_at_second_check, checkpoint)
+    resumed = trained(pool, SETTINGS, checkpoint)
+    for name, value in whole.items():
+        torch.testing.assert_close(resumed[name], value, rtol=0, atol=0)
+
+
+def test_a_few_steps_lower_the_loss(pool: CropPool) -> None:
+    batch = SingleBatches(pool, 5, photos=2).batch(0)
+    net = tiny("sv")
+
+    def loss() -> torch.Tensor:
+        terms = [example_loss(light_fields(net(f), e.on), e) for f, e in batch]
+        return torch.stack(terms).mean()
+
+    optimizer = torch.optim.AdamW(net.parameters(), 3e-3)
+    first = float(loss().detach())
+    for _ in range(12):
+        optimizer.zero_grad()
+        value = loss()
+        value.backward()
+        optimizer.step()
+    assert float(loss().detach()) < 0.9 * first
+
+
+def test_gradients_reach_every_weight(pool: CropPool) -> None:
+    net = tiny("mv")
+    for parameter in net.parameters():
+        torch.nn.init.normal_(parameter, std=0.05)
+    for features, example in GroupBatches(pool, 5, photos=4).batch(0):
+        example_loss(light_fields(net(features), example.on, example.warped), example).backward()
+    silent = [name for name, p in net.named_parameters() if not (p.grad != 0).any()]
+    assert not silent
+
+
+def test_training_that_diverges_says_so(pool: CropPool) -> None:
+    net = tiny("sv")
+    torch.nn.init.constant_(net.head.weight, float("nan"))
+    with pytest.raises(DivergedError, match="step 0 is not finite"):
+        fit(net, SingleBatches(pool, 5, photos=1), SETTINGS, lambda _: 0.0)
+
+
+def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:
+    settings = FitSettings(steps=100, rate=1.0, warmup=10, cooldown=0.4)
+    shares = [schedule(step, settings) for step in range(100)]
+    assert shares[0] == pytest.approx(0.1)
+    assert shares[50] == 1.0
+    assert shares[99] == pytest.approx(1 / 40)
+    assert all(a >= b for a, b in zip(shares[60:], shares[61:], strict=False))
+
+
+def test_a_widened_network_answers_as_before(pool: CropPool) -> None:
+    narrow, wide = tiny("sv"), tiny("mv")
+    torch.nn.init.normal_(narrow.head.weight, std=0.1)
+    widen(narrow, wide)
+    features, _ = group_cases(pool, 0)[0]
+    with torch.no_grad():
+        expected = narrow(features[:, : narrow.shape.inputs])
+        torch.testing.assert_close(wide(features)[:, : narrow.shape.outputs], expected)
