@@ -29,11 +29,10 @@ PIECE_SCORE = 3.5
 
 
 def merge_pieces(groups: Sequence[Group], views: Sequence[ViewBlobs]) -> list[Group]:
-    """Join groups whose extents meet in space, in the order of the first pieces."""
+    """Join groups that are one lamp, in the order of the first pieces."""
     merged: list[Group] = []
     for group in groups:
-        size = extent(group, views)
-        partner = next((m for m in merged if _one_lamp(m, group, size, views)), None)
+        partner = next((m for m in merged if _one_lamp(m, group, views)), None)
         if partner is None:
             merged.append(group)
             continue
@@ -43,31 +42,39 @@ def merge_pieces(groups: Sequence[Group], views: Sequence[ViewBlobs]) -> list[Gr
 
 
 def add_pieces(groups: Sequence[Group], views: Sequence[ViewBlobs]) -> None:
-    """Give each lamp the free regions that lie within its extent, in every view."""
+    """Give each lamp the free regions that lie within its extent, in every view that shows it."""
     taken = {(v, i) for g in groups for v, members in g.members.items() for i in members}
     for group in groups:
         size = extent(group, views)
-        for index, view in enumerate(views):
-            centre, depth = project(view.camera, group.place[None])
-            if depth[0] <= 0 or index not in group.members:
-                continue
-            radius = size * view.camera.fx / depth[0]
-            for number, blob in enumerate(view.blobs):
-                place = np.array(blob.centre) * (view.camera.width, view.camera.height)
-                near = np.linalg.norm(place - centre[0]) < radius
-                free = (index, number) not in taken
-                if near and free and view.scores[number] >= PIECE_SCORE:
+        for index in sorted(group.members):
+            view = views[index]
+            for number, score in enumerate(view.scores):
+                free = (index, number) not in taken and score >= PIECE_SCORE
+                if free and _within(view, number, group, size):
                     group.members[index].append(number)
                     taken.add((index, number))
 
 
-def _one_lamp(a: Group, b: Group, b_size: float, views: Sequence[ViewBlobs]) -> bool:
-    distance = float(np.linalg.norm(a.place - b.place))
-    if distance < REACH * (extent(a, views) + b_size):
+def _one_lamp(a: Group, b: Group, views: Sequence[ViewBlobs]) -> bool:
+    size = extent(a, views)
+    if np.linalg.norm(a.place - b.place) < REACH * (size + extent(b, views)):
+        return True
+    # What hides the lamp moves along it from view to view, so that the rays of a piece can meet
+    # far from the lamp; in the pictures the piece still lies within it.
+    covered = [_within(views[v], b.members[v][0], a, size) for v in b.members]
+    if np.mean(covered) > 0.5:
         return True
     shared = sorted(set(a.members) & set(b.members))
     lined_up = [_in_line(views[v], a.members[v][0], b.members[v][0]) for v in shared]
     return len(shared) >= 2 and float(np.mean(lined_up)) >= 0.5
+
+
+def _within(view: ViewBlobs, index: int, group: Group, size: float) -> bool:
+    """Whether a region's centre lies in the lamp's reprojected extent."""
+    centre, depth = project(view.camera, group.place[None])
+    place = np.array(view.blobs[index].centre) * (view.camera.width, view.camera.height)
+    reach = size * view.camera.fx / max(float(depth[0]), 1e-9)
+    return bool(depth[0] > 0 and np.linalg.norm(place - centre[0]) < reach)
 
 
 def _in_line(view: ViewBlobs, a: int, b: int) -> bool:
