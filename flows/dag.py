@@ -108,19 +108,9 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "evaluate",
         "the tables: decomposition, harmonization and relighting against truth",
-        needs=(
-            "render",
-            "capture",
-            "masks",
-            "train_sv",
-            "train_mv",
-            "splat",
-            "decompose",
-            "harmonize",
-            "fuse",
-            "relight",
-        ),
+        needs=("render", "capture", "masks", "train_sv", "train_mv", "fuse", "relight"),
         code=("luxcore/evaluate", "luxcore/metrics", "luxcore/models", "luxcore/splats", "kernels"),
+        settings=("splat",),
     ),
     Stage(
         "report",

@@ -1,14 +1,15 @@
-"""Stage evaluate: decomposition and harmonization against truth."""
+"""Stage evaluate: decomposition, harmonization and relightable scenes against truth."""
 
 from __future__ import annotations
 
 from luxcore.data.compact import list_rendered
 from luxcore.evaluate.run import evaluate_models
+from luxcore.evaluate.scenes import SceneFolders, evaluate_scenes
 from tasks.context import StageContext
 
 
 def run(stage: StageContext) -> None:
-    """Both tables on the rendered test rooms and on every capture with truth."""
+    """The tables on the rendered test rooms and on every capture with truth."""
     captures = [
         (stage.input("capture") / capture, stage.input("masks") / capture)
         for capture in stage.captures
@@ -23,5 +24,18 @@ def run(stage: StageContext) -> None:
         seed=stage.seed,
     )
     stage.log_metrics(metrics)
+    stage.log_metrics(evaluate_scenes(_scenes(stage), stage.out, stage.params.splat.holdout_every))
     for picture in sorted((stage.out / "pictures").glob("*.png")):
         stage.log_picture(picture.stem, picture)
+
+
+def _scenes(stage: StageContext) -> list[SceneFolders]:
+    return [
+        SceneFolders(
+            stage.input("capture") / name,
+            stage.input("masks") / name,
+            stage.input("fuse") / name,
+            stage.input("relight") / name,
+        )
+        for name in stage.captures
+    ]

@@ -20,7 +20,11 @@ def run(stage: StageContext) -> None:
     """One unit per capture."""
     for name in stage.captures:
         capture = load_capture(stage.input("capture") / name)
-        inputs = [stage.input(kind) / name for kind in ("splat", "fuse", "masks")]
+        inputs = [
+            stage.input("splat") / name,
+            stage.input("fuse") / name,
+            stage.input("masks") / name,
+        ]
 
         def fit(
             out: Path, checkpoint: Path, capture: Capture = capture, inputs: list[Path] = inputs
