@@ -25,7 +25,8 @@ SERVER = "luxcore.render.blender.server"
 class BlenderProcess:
     """A pipe to one child. After a failure of the child itself the next request starts another."""
 
-    def __init__(self) -> None:
+    def __init__(self, server: str = SERVER) -> None:
+        self._server = server
         self._child: subprocess.Popen[bytes] | None = None
         self._log: Any = None
 
@@ -62,7 +63,7 @@ class BlenderProcess:
         self.stop()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the child)
         self._child = subprocess.Popen(
-            [sys.executable, "-m", SERVER],
+            [sys.executable, "-m", self._server],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
