@@ -12,7 +12,6 @@
 
 #define LANE_X ((float16)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
 #define LANE_Y ((float16)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
-#define VECTORS ((CHANNELS + 15) / 16)
 
 typedef struct {
   int x0, y0;     // first pixel of the block
@@ -81,22 +80,18 @@ __kernel void weights_fill(const int2 size, __global const int2 *ranges,
   }
 }
 
-void gather(__global const int *start, __global const int *others, __global const float *weights,
-            __global const float *values, const int row, float16 *sums) {
-  for (int v = 0; v < VECTORS; ++v) sums[v] = (float16)(0.0f);
-  for (int e = start[row]; e < start[row + 1]; ++e) {
-    __global const float *other = values + (size_t)others[e] * CHANNELS;
-    for (int v = 0; v < VECTORS; ++v) sums[v] = fma(weights[e], vload16(v, other), sums[v]);
-  }
-}
-
-// out [rows, CHANNELS] = W values. Rows are pixels, or Gaussians for the transposed matrix.
+// out [rows, CHANNELS] = W values. Rows are pixels, or Gaussians for the transposed matrix. One
+// float16 of channels at a time: with several, the sums would not stay in registers.
 __kernel void apply(__global const int *start, __global const int *others,
                     __global const float *weights, __global const float *values, const int rows,
                     __global float *out) {
   const int row = get_global_id(0);
   if (row >= rows) return;
-  float16 sums[VECTORS];
-  gather(start, others, weights, values, row, sums);
-  for (int c = 0; c < CHANNELS; ++c) out[(size_t)row * CHANNELS + c] = ((float *)sums)[c];
+  for (int first = 0; first < CHANNELS; first += 16) {
+    float16 sum = (float16)(0.0f);
+    for (int e = start[row]; e < start[row + 1]; ++e)
+      sum = fma(weights[e], vload16(0, values + (size_t)others[e] * CHANNELS + first), sum);
+    for (int c = first; c < min(first + 16, CHANNELS); ++c)
+      out[(size_t)row * CHANNELS + c] = ((float *)&sum)[c - first];
+  }
 }

@@ -28,35 +28,39 @@ __kernel void composition_rows(__global const float *x, __global const float *ph
   const float s = sigmoid(raw_gamma);
   const float gamma = GAMMA_MIN + (GAMMA_MAX - GAMMA_MIN) * s;
   const float power = 1.0f / gamma;
-  float weight[3 * LIGHTS], sums[COLUMNS];
-  for (int c = 0; c < 3 * LIGHTS; ++c) weight[c] = params[c] * unit[c / 3];
-  for (int c = 0; c < COLUMNS; ++c) sums[c] = 0.0f;
+  float3 weight[LIGHTS], d_weight[LIGHTS];
+  for (int m = 0; m < LIGHTS; ++m) {
+    weight[m] = vload3(m, params) * unit[m];
+    d_weight[m] = (float3)(0.0f);
+  }
+  float3 d_beta = (float3)(0.0f), d_power = (float3)(0.0f), errors = (float3)(0.0f);
   for (int col = 0; col < WIDTH; ++col) {
     const size_t pixel = (size_t)row * WIDTH + col;
     __global const float *in = x + pixel * 3 * LIGHTS;
     __global float *out = d_x + pixel * 3 * LIGHTS;
-    for (int k = 0; k < 3; ++k) {
-      float total = 0.0f;
-      for (int m = 0; m < LIGHTS; ++m) total += weight[3 * m + k] * in[3 * m + k];
-      // Weights and radiances below zero may add up to less than -β early in a run.
-      const int live = total > 0.0f;
-      const float v = fmax(total, 0.0f) + beta;
-      const float target = photo[pixel * 3 + k];
-      const float tone = exp(power * log(v));
-      const float error = tone - target;
-      const int ignored = target >= CLIPPED && error > 0.0f;
-      const float d_tone = ignored ? 0.0f : scale * sign(error);
-      const float d_v = d_tone * power * tone / v;
-      for (int m = 0; m < LIGHTS && live; ++m) {
-        out[3 * m + k] += d_v * weight[3 * m + k];
-        sums[3 * m + k] += d_v * unit[m] * in[3 * m + k];
-      }
-      sums[3 * LIGHTS] += d_v;
-      sums[3 * LIGHTS + 1] -= d_tone * tone * log(v) * power * power;
-      sums[PARAMS] += ignored ? 0.0f : fabs(error);
+    float3 total = (float3)(0.0f);
+    for (int m = 0; m < LIGHTS; ++m) total += weight[m] * vload3(m, in);
+    // Weights and radiances below zero may add up to less than -β early in a run.
+    const float3 v = fmax(total, 0.0f) + beta;
+    const float3 target = vload3(pixel, photo);
+    const float3 log_v = log(v), tone = exp(power * log_v);
+    const float3 error = tone - target;
+    const int3 ignored = target >= CLIPPED && error > 0.0f;
+    const float3 d_tone = ignored ? (float3)(0.0f) : scale * sign(error);
+    const float3 d_v = d_tone * power * tone / v;
+    const float3 d_total = total > 0.0f ? d_v : (float3)(0.0f);
+    for (int m = 0; m < LIGHTS; ++m) {
+      vstore3(vload3(m, out) + d_total * weight[m], m, out);
+      d_weight[m] += d_total * vload3(m, in);
     }
+    d_beta += d_v;
+    d_power += d_tone * tone * log_v;
+    errors += ignored ? (float3)(0.0f) : fabs(error);
   }
-  sums[3 * LIGHTS] *= sigmoid(raw_beta);
-  sums[3 * LIGHTS + 1] *= (GAMMA_MAX - GAMMA_MIN) * s * (1.0f - s);
-  for (int c = 0; c < COLUMNS; ++c) partials[row * COLUMNS + c] = sums[c];
+  __global float *sums = partials + row * COLUMNS;
+  for (int m = 0; m < LIGHTS; ++m) vstore3(d_weight[m] * unit[m], m, sums);
+  sums[3 * LIGHTS] = (d_beta.x + d_beta.y + d_beta.z) * sigmoid(raw_beta);
+  sums[3 * LIGHTS + 1] = -(d_power.x + d_power.y + d_power.z) * power * power *
+                         (GAMMA_MAX - GAMMA_MIN) * s * (1.0f - s);
+  sums[PARAMS] = errors.x + errors.y + errors.z;
 }

@@ -17,6 +17,7 @@ from luxcore.splats.harmonics import sh_backward, sh_forward
 from luxcore.splats.harmonics_choice import HarmonicsChoice, choose_degree
 from luxcore.splats.losses.image import ImageLoss
 from luxcore.splats.model import DeviceGaussians
+from luxcore.splats.morton import morton_order
 from luxcore.splats.optimizer import Adam
 from luxcore.splats.rasterizer import (
     RasterConfig,
@@ -156,6 +157,7 @@ class GeometryFit:
         )  # fmt: skip
 
     def _replace(self, edit: Edit) -> None:
+        edit = edit.take(morton_order(edit.gaussians.means))
         self.model = DeviceGaussians.upload(self.device, edit.gaussians)
         self.adam.rearrange(edit.parents, edit.fresh)
 

@@ -10,6 +10,7 @@ from jaxtyping import Float32, UInt8
 from luxcore.cameras import Camera
 from luxcore.splats.gaussians import Gaussians, sh_from_color
 from luxcore.splats.losses.smoothness import mean_neighbor_distance
+from luxcore.splats.morton import morton_order
 
 _NEIGHBORS = 3
 _OPACITY = 0.3
@@ -37,14 +38,16 @@ def initial_gaussians(
     limit: int,
     random: np.random.Generator,
 ) -> Gaussians:
-    """At most `limit` Gaussians at points drawn without replacement, in file order.
+    """At most `limit` Gaussians at points drawn without replacement, in Z-order.
 
     Each scale is the root mean square distance to the three nearest other points, so duplicates
     and lone points get bounded blobs: between 1e-4 and 0.1 of `extent`.
     """
     if len(xyz) > limit:
-        chosen = np.sort(random.choice(len(xyz), limit, replace=False))
+        chosen = random.choice(len(xyz), limit, replace=False)
         xyz, rgb = xyz[chosen], rgb[chosen]
+    order = morton_order(xyz)
+    xyz, rgb = xyz[order], rgb[order]
     distance = mean_neighbor_distance(xyz, _NEIGHBORS, floor=1e-4 * extent)
     scale = np.clip(distance, 1e-4 * extent, 0.1 * extent)
     n = len(xyz)

@@ -145,7 +145,7 @@ def _prune(edit: Edit, extent: float, settings: StandardSettings) -> Edit:
     numbers = np.concatenate([g.means, g.quats, g.log_scales, g.opacity_logits[:, None]], axis=1)
     keep = (opacity >= settings.prune_opacity) & (size <= settings.prune_size * extent)
     keep &= np.isfinite(numbers).all(axis=1)
-    return Edit(g.take(keep), edit.parents[keep], edit.fresh[keep])
+    return edit.take(keep)
 
 
 def _reset(edit: Edit) -> Edit:

@@ -25,6 +25,10 @@ class Edit:
     parents: Int[np.ndarray, " n"]
     fresh: Bool[np.ndarray, " n"]
 
+    def take(self, index: np.ndarray) -> Edit:
+        """The part of the new population at `index` (positions or a mask), in that order."""
+        return Edit(self.gaussians.take(index), self.parents[index], self.fresh[index])
+
 
 @runtime_checkable
 class Strategy(Protocol):
