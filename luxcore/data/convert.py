@@ -1,15 +1,18 @@
-"""Between our compact form and the public layout, both ways, and out to nerfstudio."""
+"""Between our compact form and the public layout, both ways, and photos out to other tools."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from luxcore.cameras import camera_to_nerfstudio
+import numpy as np
+
+from luxcore.cameras import Camera, camera_to_nerfstudio
 from luxcore.data.compact import load_rendered, read_metadata, save_rendered
 from luxcore.data.crops import LitCrop
 from luxcore.data.public_reader import open_scenes
 from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
+from luxcore.data.rotations import quaternion_from_matrix
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder, write_json
 from luxcore.files.exr import write_exr
@@ -48,10 +51,11 @@ def public_to_compact(path: Path, out: Path) -> list[Path]:
     return stems
 
 
-def export_nerfstudio(crops: Sequence[LitCrop], out: Path) -> Path:
-    """Photos with their cameras: `images/0000.png` …, `depth/0000.exr` and `transforms.json`.
+def export_photos(crops: Sequence[LitCrop], out: Path) -> Path:
+    """Photos with their cameras, as nerfstudio and as COLMAP want them.
 
-    Photos are AgX(exposure · light). Raises InputError where there are none.
+    `images/0000.png` … (AgX(exposure · light)), `depth/0000.exr`, `transforms.json`, and
+    `sparse/0/*.txt` (poses without points). Raises InputError where there are no photos.
     """
     if not crops:
         raise InputError("there are no photos to export.")
@@ -59,9 +63,26 @@ def export_nerfstudio(crops: Sequence[LitCrop], out: Path) -> Path:
     with atomic_folder(Path(out)) as folder:
         for number, crop in enumerate(crops):
             name = f"images/{number:04d}.png"
-            write_png(folder / name, agx(crop.image_linear * crop.exposure))
+            write_png(folder / name, agx(crop.image_linear * np.float32(crop.exposure)))
             depth = {"depth_m": crop.depth_m}
             write_exr(folder / "depth" / f"{number:04d}.exr", depth, half=False)
             frames.append({"file_path": name, **camera_to_nerfstudio(crop.camera)})
         write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
+        _write_colmap(folder / "sparse" / "0", [crop.camera for crop in crops])
     return Path(out)
+
+
+def _write_colmap(folder: Path, cameras: Sequence[Camera]) -> None:
+    """COLMAP's text model: a PINHOLE camera and a world-to-camera pose per photo, no points."""
+    folder.mkdir(parents=True)
+    intrinsics, poses = [], []
+    for number, camera in enumerate(cameras, start=1):
+        lens = f"{camera.fx} {camera.fy} {camera.cx} {camera.cy}"
+        intrinsics.append(f"{number} PINHOLE {camera.width} {camera.height} {lens}\n")
+        turn = quaternion_from_matrix(camera.viewmat[:3, :3])
+        pose = " ".join(repr(float(v)) for v in (*turn, *camera.viewmat[:3, 3]))
+        # The empty second line stands for the photo's points.
+        poses.append(f"{number} {pose} {number} {number - 1:04d}.png\n\n")
+    (folder / "cameras.txt").write_text("".join(intrinsics), encoding="utf-8")
+    (folder / "images.txt").write_text("".join(poses), encoding="utf-8")
+    (folder / "points3D.txt").write_text("", encoding="utf-8")

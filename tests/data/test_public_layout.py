@@ -17,7 +17,7 @@ from analytic import panorama, perspective
 
 from luxcore.cameras import camera_from_nerfstudio, look_at
 from luxcore.data.compact import as_taken, load_rendered, save_rendered
-from luxcore.data.convert import compact_to_public, export_nerfstudio, public_to_compact
+from luxcore.data.convert import compact_to_public, export_photos, public_to_compact
 from luxcore.data.crops import ViewSource
 from luxcore.data.panorama import view_rotation
 from luxcore.data.public_names import mask_colours, paint_masks, pick_mask
@@ -256,14 +256,20 @@ def test_quaternions_and_matrices_are_inverse(seed):
     assert np.allclose(matrix_from_quaternion(quaternion_from_matrix(rotation)), rotation)
 
 
-def test_photos_go_out_to_nerfstudio(tmp_path):
+def test_photos_go_out_with_their_cameras(tmp_path):
+    import pycolmap
+
     source = ViewSource(panorama())
     crops = [source.cut(view_rotation(a, 0.0), 60.0, 32, 24) for a in (0.0, 40.0)]
-    export_nerfstudio(crops, tmp_path / "ns")
-    about = json.loads((tmp_path / "ns" / "transforms.json").read_text())
+    export_photos(crops, tmp_path / "out")
+    about = json.loads((tmp_path / "out" / "transforms.json").read_text())
     camera = camera_from_nerfstudio(about["frames"][1])
     assert np.allclose(camera.c2w, crops[1].camera.c2w)
-    with Image.open(tmp_path / "ns" / about["frames"][0]["file_path"]) as image:
+    with Image.open(tmp_path / "out" / about["frames"][0]["file_path"]) as image:
         assert image.size == (32, 24)
+    model = pycolmap.Reconstruction(str(tmp_path / "out" / "sparse" / "0"))
+    image = next(i for i in model.images.values() if i.name == "0001.png")
+    assert np.allclose(image.cam_from_world().matrix(), crops[1].camera.viewmat[:3])
+    assert model.cameras[image.camera_id].focal_length_x == pytest.approx(crops[1].camera.fx)
     with pytest.raises(InputError, match="no photos"):
-        export_nerfstudio([], tmp_path / "none")
+        export_photos([], tmp_path / "none")
