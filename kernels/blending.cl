@@ -10,6 +10,8 @@
 #define LUX_BLENDING_CL
 #pragma OPENCL FP_CONTRACT OFF
 
+#define LOG2_E 1.4426950408889634f
+
 // record = (mean2d x, mean2d y, a, b, c, l, depth, det of [[a, b/2], [b/2, c]])
 #define RECORD_X(r) ((r).s0)
 #define RECORD_Y(r) ((r).s1)
@@ -73,6 +75,7 @@ DEFINE_BLENDING(float16, int16, block)
   }
 
 DEFINE_ELLIPSE(float, pixel)
+DEFINE_ELLIPSE(float8, rows)
 DEFINE_ELLIPSE(float16, block)
 
 #endif

@@ -9,7 +9,6 @@
 #define MOMENTS 6
 
 __kernel void gather_partials(const int n, __global const int *order, __global const int *offsets,
-                              __global const int *tile_counts,
                               __global const int *slot_positions, __global const float *partials,
                               __global const uchar *touched, __global float *moments,
                               __global float *d_colors) {
@@ -19,8 +18,8 @@ __kernel void gather_partials(const int n, __global const int *order, __global c
   float4 sum[PARTIAL_SIZE / 4];
 #pragma unroll
   for (int v = 0; v < PARTIAL_SIZE / 4; ++v) sum[v] = (float4)(0.0f);
-  const int end = offsets[i] + tile_counts[i];
-  for (int slot = offsets[i]; slot < end; ++slot) {
+  const int end = offsets[k + 1];
+  for (int slot = offsets[k]; slot < end; ++slot) {
     const int row = slot_positions[slot];
     if (!touched[row]) continue;
 #pragma unroll

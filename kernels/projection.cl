@@ -1,33 +1,41 @@
 // Projection of 3D Gaussians to records on the screen (see footprint.cl), culling, and the number of
 // tiles that each one reaches.
 //
-// One work-item per Gaussian, n of them. A Gaussian that is not drawn gets the last depth key, no
+// LANES Gaussians per work-item, n in all. A Gaussian that is not drawn gets the last depth key, no
 // tiles and radius 0. Keys are the bits of the depth, which sort like positive floats.
 // Compile-time: see footprint.cl and tiles.cl.
 #include "footprint.cl"
 #include "tiles.cl"
-#line 10 "projection.cl"
+#line 11 "projection.cl"
 
 #define HIDDEN_KEY 0xffffffffu
-#define LOG2_E 1.4426950408889634f
 
-// False where nothing is drawn; every value is checked before a tile is counted or a key made.
-int make_record(const Footprint *f, const float opacity_logit, const float4 intrinsics,
-                const int2 size, float8 *record, float2 *extent) {
-  const float opacity = compensation(f) / (1.0f + exp(-opacity_logit));
-  if (!(opacity >= ALPHA_MIN)) return 0;  // before the logarithm
-  const float l = log2(opacity);
-  const float reach = sqrt((2.0f / LOG2_E) * (l - LOG2_ALPHA_MIN));
-  *extent = reach * (float2)(sqrt(f->xx), sqrt(f->yy));
-  const float mx = intrinsics.x * f->t.x / f->t.z + intrinsics.z;
-  const float my = intrinsics.y * f->t.y / f->t.z + intrinsics.w;
-  if (!isfinite(extent->x + extent->y + mx + my)) return 0;
-  if (mx + extent->x <= 0 || mx - extent->x >= size.x) return 0;
-  if (my + extent->y <= 0 || my - extent->y >= size.y) return 0;
-  const float k = 0.5f * LOG2_E / f->det;
-  *record = (float8)(mx, my, -k * f->yy, 2.0f * k * f->xy, -k * f->xx, l, f->t.z,
-                     0.5f * LOG2_E * k);
-  return 1;
+typedef struct {
+  I drawn;
+  F x, y, a, b, c, l, det;  // of the record, see blending.cl
+  F radius;                 // px, the larger half side of the bounding box
+} Screen;
+
+// Every value is checked before a tile is counted or a key is made of it.
+Screen to_screen(const Footprint *f, const F opacity_logit, const float4 intrinsics,
+                 const int2 size) {
+  Screen s;
+  s.l = log2_compensation(f) - log2_f(1.0f + exp_f(-opacity_logit));
+  const F above = s.l - LOG2_ALPHA_MIN;  // culled where negative, before the root
+  const F reach = sqrt(fmax(above, (F)0.0f) * (2.0f / LOG2_E));
+  const F rx = reach * sqrt(f->xx), ry = reach * sqrt(f->yy);
+  s.radius = fmax(rx, ry);
+  s.x = fma(intrinsics.x, f->t.x / f->t.z, (F)intrinsics.z);
+  s.y = fma(intrinsics.y, f->t.y / f->t.z, (F)intrinsics.w);
+  s.drawn = f->valid && above >= 0.0f && rx + ry + fabs(s.x) + fabs(s.y) < 1e9f &&
+            s.x + rx > 0.0f && s.x - rx < (float)size.x && s.y + ry > 0.0f &&
+            s.y - ry < (float)size.y;
+  const F k = (0.5f * LOG2_E) / f->det;
+  s.a = -k * f->yy;
+  s.b = 2.0f * k * f->xy;
+  s.c = -k * f->xx;
+  s.det = (0.5f * LOG2_E) * k;
+  return s;
 }
 
 __kernel void project_gaussians(const int n, const float16 view, const float4 intrinsics,
@@ -36,27 +44,27 @@ __kernel void project_gaussians(const int n, const float16 view, const float4 in
                                 __global const float *opacity_logits, __global float *records,
                                 __global uint *depth_keys, __global int *tile_counts,
                                 __global int *radii) {
-  const int i = get_global_id(0);
-  if (i >= n) return;
-  Footprint f;
-  float8 record;
-  float2 extent;
-  if (!footprint(vload3(i, means), vload4(i, quats), vload3(i, log_scales), view, intrinsics, size,
-                 &f) ||
-      !make_record(&f, opacity_logits[i], intrinsics, size, &record, &extent)) {
-    radii[i] = 0;
-    tile_counts[i] = 0;
-    depth_keys[i] = HIDDEN_KEY;
-    return;
+  const int first = get_global_id(0) * LANES;
+  if (first >= n) return;
+  const Footprint f = footprint(first, n, view, intrinsics, size, means, quats, log_scales);
+  const Screen s =
+      to_screen(&f, load_field(opacity_logits, first, n, 1, 0), intrinsics, size);
+  store_field(s.x, records, first, n, 8, 0);
+  store_field(s.y, records, first, n, 8, 1);
+  store_field(s.a, records, first, n, 8, 2);
+  store_field(s.b, records, first, n, 8, 3);
+  store_field(s.c, records, first, n, 8, 4);
+  store_field(s.l, records, first, n, 8, 5);
+  store_field(f.t.z, records, first, n, 8, 6);
+  store_field(s.det, records, first, n, 8, 7);
+  // A negative radius marks what is not drawn.
+  store_field(s.drawn ? s.radius : (F)-1.0f, (__global float *)radii, first, n, 1, 0);
+  for (int i = first; i < min(first + LANES, n); ++i) {
+    const float radius = ((__global float *)radii)[i];
+    const float8 record = vload8(i, records);
+    const int count = radius >= 0.0f ? count_tiles(record, size) : 0;
+    tile_counts[i] = count;
+    radii[i] = count ? (int)ceil(radius) : 0;
+    depth_keys[i] = count ? as_uint(RECORD_DEPTH(record)) : HIDDEN_KEY;
   }
-  TileRows rows = tile_rows(record, size);
-  int count = 0;
-  for (int row = rows.first; row < rows.end; ++row) {
-    const int2 span = tile_span(&rows, row);
-    count += span.y - span.x;
-  }
-  vstore8(record, i, records);
-  tile_counts[i] = count;
-  radii[i] = count ? (int)fmin(ceil(fmax(extent.x, extent.y)), 1e9f) : 0;
-  depth_keys[i] = count ? as_uint(f.t.z) : HIDDEN_KEY;
 }

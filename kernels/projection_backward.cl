@@ -1,5 +1,5 @@
 // Derivative of the projection (see footprint.cl): from what blending left per Gaussian to means,
-// quaternions, log-scales and opacity logits. One work-item per Gaussian, n of them.
+// quaternions, log-scales and opacity logits. LANES Gaussians per work-item, n in all.
 //
 // moments [n, 8]: with h = dL/d ln(alpha) of a pixel and d = mean2d - pixel, the sums over pixels of
 // h, h dx, h dy, h dx^2, h dx dy, h dy^2, then dL/d depth.
@@ -7,86 +7,115 @@
 #include "footprint.cl"
 #line 9 "projection_backward.cl"
 
+typedef struct {
+  F x, y;        // dL/d mean2d
+  F xx, xy, yy;  // dL/d cov2d, symmetric: xy is one of two equal entries
+} ScreenGradient;
+
+// ln alpha = ln opacity - (a dx^2 + c dy^2) / 2 - b dx dy with the conic [[a, b], [b, c]] = cov2d^-1,
+// so d_cov = -conic V conic, V = -1/2 [[h dx^2, h dx dy], [h dx dy, h dy^2]].
+ScreenGradient screen_gradient(const Footprint *f, __global const float *moments, const int first,
+                               const int n) {
+  const F inverse = 1.0f / f->det;
+  const F a = f->yy * inverse, b = -f->xy * inverse, c = f->xx * inverse;
+  const F hx = load_field(moments, first, n, 8, 1), hy = load_field(moments, first, n, 8, 2);
+  const F va = 0.5f * load_field(moments, first, n, 8, 3);
+  const F vb = 0.5f * load_field(moments, first, n, 8, 4);
+  const F vc = 0.5f * load_field(moments, first, n, 8, 5);
+  const F p00 = a * va + b * vb, p01 = a * vb + b * vc;
+  const F p10 = b * va + c * vb, p11 = b * vb + c * vc;
+  ScreenGradient g = {-(a * hx + b * hy), -(b * hx + c * hy), p00 * a + p01 * b,
+                      p00 * b + p01 * c, p10 * b + p11 * c};
+#if ANTIALIASED
+  // d ln sqrt(det_sharp / det) / d cov = (cov_sharp^-1 - cov^-1) / 2, nothing at the floor.
+  const I above = f->det_sharp > COMPENSATION_MIN * COMPENSATION_MIN * f->det;
+  const F k = above ? 0.5f * load_field(moments, first, n, 8, 0) : (F)0.0f;
+  const F sharp = 1.0f / (above ? f->det_sharp : (F)1.0f);
+  g.xx += k * ((f->yy - EPS2D) * sharp - a);
+  g.xy += k * (-f->xy * sharp - b);
+  g.yy += k * ((f->xx - EPS2D) * sharp - c);
+#endif
+  return g;
+}
+
+// Through R(q / |q|): g0, g1, g2 are the rows of dL/dR.
+void quaternion_gradient(const Footprint *f, const V3 g0, const V3 g1, const V3 g2, F *d_quat) {
+  const F w = f->w, x = f->x, y = f->y, z = f->z;
+  const F yz = g2.y - g1.z, zx = g0.z - g2.x, xy = g1.x - g0.y;
+  const F sx = g1.z + g2.y, sy = g0.z + g2.x, sz = g0.y + g1.x;
+  const F dw = 2.0f * (x * yz + y * zx + z * xy);
+  const F dx = 2.0f * (w * yz - 2.0f * x * (g1.y + g2.z) + y * sz + z * sy);
+  const F dy = 2.0f * (w * zx + x * sz - 2.0f * y * (g0.x + g2.z) + z * sx);
+  const F dz = 2.0f * (w * xy + x * sy + y * sx - 2.0f * z * (g0.x + g1.y));
+  const F along = dw * w + dx * x + dy * y + dz * z, inverse = 1.0f / f->quat_norm;
+  d_quat[0] = (dw - along * w) * inverse;
+  d_quat[1] = (dx - along * x) * inverse;
+  d_quat[2] = (dy - along * y) * inverse;
+  d_quat[3] = (dz - along * z) * inverse;
+}
+
+// dL/dt of the mean in camera axes: through mean2d, the Jacobian and the depth.
+V3 camera_gradient(const Footprint *f, const ScreenGradient *g, const V3 d_jw0, const V3 d_jw1,
+                   const F d_depth, const float16 view, const float4 intrinsics) {
+  const V3 w0 = {(F)view.s0, (F)view.s1, (F)view.s2}, w1 = {(F)view.s4, (F)view.s5, (F)view.s6};
+  const V3 w2 = {(F)view.s8, (F)view.s9, (F)view.sa};
+  const F iz = 1.0f / f->t.z, jx = intrinsics.x * iz, jy = intrinsics.y * iz;
+  // j02 = -fx tx / z^2. A clamped tx is limit * z, so it falls with 1/z and does not see x.
+  const F kx = jx * iz * dot3(d_jw0, w2), ky = jy * iz * dot3(d_jw1, w2);
+  V3 t = {g->x * jx - (f->clamped_x ? (F)0.0f : kx), g->y * jy - (f->clamped_y ? (F)0.0f : ky),
+          d_depth};
+  t.z -= (g->x * jx * f->t.x + g->y * jy * f->t.y) * iz;
+  t.z -= (jx * dot3(d_jw0, w0) + jy * dot3(d_jw1, w1)) * iz;
+  t.z += kx * f->tx * iz * (f->clamped_x ? (F)1.0f : (F)2.0f);
+  t.z += ky * f->ty * iz * (f->clamped_y ? (F)1.0f : (F)2.0f);
+  const V3 world = {t.x * view.s0 + t.y * view.s4 + t.z * view.s8,
+                    t.x * view.s1 + t.y * view.s5 + t.z * view.s9,
+                    t.x * view.s2 + t.y * view.s6 + t.z * view.sa};
+  return world;
+}
+
+// Zero where the Gaussian was not drawn.
+inline V3 only(const I drawn, const V3 v) {
+  const V3 r = {drawn ? v.x : (F)0.0f, drawn ? v.y : (F)0.0f, drawn ? v.z : (F)0.0f};
+  return r;
+}
+
 __kernel void project_gaussians_backward(
     const int n, const float16 view, const float4 intrinsics, const int2 size,
     __global const float *means, __global const float *quats, __global const float *log_scales,
     __global const float *opacity_logits, __global const int *radii,
-    __global const float *moments,
-    __global float *d_means, __global float *d_quats, __global float *d_log_scales,
-    __global float *d_opacity_logits, __global float *mean2d_norm,
+    __global const float *moments, __global float *d_means, __global float *d_quats,
+    __global float *d_log_scales, __global float *d_opacity_logits, __global float *mean2d_norm,
     __global uchar *visible) {
-  const int i = get_global_id(0);
-  if (i >= n) return;
-  Footprint f;
-  visible[i] = radii[i] > 0;
-  if (radii[i] <= 0 || !footprint(vload3(i, means), vload4(i, quats), vload3(i, log_scales), view,
-                                  intrinsics, size, &f)) {
-    vstore3((float3)(0), i, d_means);
-    vstore4((float4)(0), i, d_quats);
-    vstore3((float3)(0), i, d_log_scales);
-    d_opacity_logits[i] = 0;
-    mean2d_norm[i] = 0;
-    return;
-  }
-  const float8 h = vload8(i, moments);
-  const float fx = intrinsics.x, fy = intrinsics.y;
-  // ln alpha = ln opacity - (a dx^2 + c dy^2) / 2 - b dx dy
-  const float a = f.yy / f.det, b = -f.xy / f.det, c = f.xx / f.det;
-  const float2 d_mean2d = -(float2)(a * h.s1 + b * h.s2, b * h.s1 + c * h.s2);
-  mean2d_norm[i] = hypot(d_mean2d.x * 0.5f * size.x, d_mean2d.y * 0.5f * size.y);
-  d_opacity_logits[i] = h.s0 / (1.0f + exp(opacity_logits[i]));
+  const int first = get_global_id(0) * LANES;
+  if (first >= n) return;
+  const Footprint f = footprint(first, n, view, intrinsics, size, means, quats, log_scales);
+  const I drawn = as_bits(load_field((__global const float *)radii, first, n, 1, 0)) > 0;
+  const ScreenGradient g = screen_gradient(&f, moments, first, n);
+  const F nx = g.x * (0.5f * size.x), ny = g.y * (0.5f * size.y);
+  store_field(drawn ? sqrt(nx * nx + ny * ny) : (F)0.0f, mean2d_norm, first, n, 1, 0);
+  const F d_logit = load_field(moments, first, n, 8, 0) /
+                    (1.0f + exp_f(load_field(opacity_logits, first, n, 1, 0)));
+  store_field(drawn ? d_logit : (F)0.0f, d_opacity_logits, first, n, 1, 0);
 
-  // conic = cov2d^-1, so d_cov = -conic V conic with V symmetric.
-  const float va = -0.5f * h.s3, vb = -0.5f * h.s4, vc = -0.5f * h.s5;
-  const float p00 = a * va + b * vb, p01 = a * vb + b * vc;
-  const float p10 = b * va + c * vb, p11 = b * vb + c * vc;
-  float gxx = -(p00 * a + p01 * b), gxy = -(p00 * b + p01 * c), gyy = -(p10 * b + p11 * c);
-#if ANTIALIASED
-  const float ratio = f.det_sharp / f.det;
-  if (ratio > COMPENSATION_MIN * COMPENSATION_MIN) {
-    // d ln sqrt(det_sharp / det) / d cov = 1/2 (cov_sharp^-1 - cov^-1)
-    const float k = 0.5f * h.s0, is = 1.0f / f.det_sharp;
-    gxx += k * ((f.yy - EPS2D) * is - a);
-    gxy += k * (-f.xy * is - b);
-    gyy += k * ((f.xx - EPS2D) * is - c);
-  }
-#endif
-  const float3 d_row0 = 2.0f * (gxx * f.row0 + gxy * f.row1);
-  const float3 d_row1 = 2.0f * (gxy * f.row0 + gyy * f.row1);
-
-  // rows = (J W) (R S)
-  const float3 r0 = quat_row0(f.quat), r1 = quat_row1(f.quat), r2 = quat_row2(f.quat);
-  const float3 e0 = d_row0 * f.scale, e1 = d_row1 * f.scale;
-  const float3 d_jw0 = (float3)(dot(e0, r0), dot(e0, r1), dot(e0, r2));
-  const float3 d_jw1 = (float3)(dot(e1, r0), dot(e1, r1), dot(e1, r2));
-  // d (R S), rows of the 3x3
-  const float3 m0 = f.jw0.x * d_row0 + f.jw1.x * d_row1;
-  const float3 m1 = f.jw0.y * d_row0 + f.jw1.y * d_row1;
-  const float3 m2 = f.jw0.z * d_row0 + f.jw1.z * d_row1;
-  vstore3((m0 * r0 + m1 * r1 + m2 * r2) * f.scale, i, d_log_scales);
-  const float3 g0 = m0 * f.scale, g1 = m1 * f.scale, g2 = m2 * f.scale;
-  const float w = f.quat.x, x = f.quat.y, y = f.quat.z, zq = f.quat.w;
-  float4 dq;
-  dq.x = 2 * (x * (g2.y - g1.z) + y * (g0.z - g2.x) + zq * (g1.x - g0.y));
-  dq.y = 2 * (-2 * x * (g1.y + g2.z) + y * (g0.y + g1.x) + zq * (g0.z + g2.x) + w * (g2.y - g1.z));
-  dq.z = 2 * (x * (g0.y + g1.x) - 2 * y * (g0.x + g2.z) + zq * (g1.z + g2.y) + w * (g0.z - g2.x));
-  dq.w = 2 * (x * (g0.z + g2.x) + y * (g1.z + g2.y) - 2 * zq * (g0.x + g1.y) + w * (g1.x - g0.y));
-  // through the normalisation
-  vstore4((dq - f.quat * dot(dq, f.quat)) / f.quat_norm, i, d_quats);
-
-  // J: j00 = fx / z, j02 = -fx tx / z^2, and the same for y.
-  const float3 w0 = view.s012, w1 = view.s456, w2 = view.s89a;
-  const float iz = 1.0f / f.t.z;
-  const float d_j00 = dot(d_jw0, w0), d_j02 = dot(d_jw0, w2);
-  const float d_j11 = dot(d_jw1, w1), d_j12 = dot(d_jw1, w2);
-  float3 dt;
-  dt.x = d_mean2d.x * fx * iz;
-  dt.y = d_mean2d.y * fy * iz;
-  dt.z = -(d_mean2d.x * fx * f.t.x + d_mean2d.y * fy * f.t.y) * iz * iz + h.s6;
-  dt.z -= (fx * d_j00 + fy * d_j11) * iz * iz;
-  // A clamped tx is limit * z, so j02 falls with 1/z instead of 1/z^2 and does not see x.
-  const float kx = fx * iz * iz * d_j02, ky = fy * iz * iz * d_j12;
-  if (f.clamp_x) dt.z += kx * f.tx * iz; else { dt.x -= kx; dt.z += 2 * kx * f.tx * iz; }
-  if (f.clamp_y) dt.z += ky * f.ty * iz; else { dt.y -= ky; dt.z += 2 * ky * f.ty * iz; }
-  vstore3(dt.x * w0 + dt.y * w1 + dt.z * w2, i, d_means);
+  // cov2d = rows rows^T, rows = (J W) (R S)
+  const V3 d_row0 = weighted(2.0f * g.xx, f.row0, 2.0f * g.xy, f.row1);
+  const V3 d_row1 = weighted(2.0f * g.xy, f.row0, 2.0f * g.yy, f.row1);
+  const V3 e0 = times(d_row0, f.scale), e1 = times(d_row1, f.scale);
+  const V3 d_jw0 = {dot3(e0, f.r0), dot3(e0, f.r1), dot3(e0, f.r2)};
+  const V3 d_jw1 = {dot3(e1, f.r0), dot3(e1, f.r1), dot3(e1, f.r2)};
+  const V3 g0 = weighted(f.jw0.x, e0, f.jw1.x, e1);  // rows of dL/dR
+  const V3 g1 = weighted(f.jw0.y, e0, f.jw1.y, e1);
+  const V3 g2 = weighted(f.jw0.z, e0, f.jw1.z, e1);
+  const V3 s0 = times(g0, f.r0), s1 = times(g1, f.r1), s2 = times(g2, f.r2);
+  const V3 d_log_scale = {s0.x + s1.x + s2.x, s0.y + s1.y + s2.y, s0.z + s1.z + s2.z};
+  store_v3(only(drawn, d_log_scale), d_log_scales, first, n);
+  F d_quat[4];
+  quaternion_gradient(&f, g0, g1, g2, d_quat);
+  for (int k = 0; k < 4; ++k)
+    store_field(drawn ? d_quat[k] : (F)0.0f, d_quats, first, n, 4, k);
+  const V3 d_mean = camera_gradient(&f, &g, d_jw0, d_jw1, load_field(moments, first, n, 8, 6), view,
+                                    intrinsics);
+  store_v3(only(drawn, d_mean), d_means, first, n);
+  for (int i = first; i < min(first + LANES, n); ++i) visible[i] = radii[i] > 0;
 }

@@ -7,6 +7,7 @@
 #include "tiles.cl"
 #line 9 "sort.cl"
 
+#define BATCH 32
 #define DIGITS (1 << DIGIT_BITS)
 
 int2 part_range(const int n, const int part) {
@@ -68,31 +69,61 @@ __kernel void count_pairs(const int n, __global const int *order, __global const
   part_pairs[part] = sum;
 }
 
-// Slots are handed out in depth order: Gaussian g owns offsets[g] .. offsets[g] + tile_counts[g].
+typedef struct {
+  int first, rows;                  // rows of tiles
+  int begin[SPAN_ROWS], end[SPAN_ROWS];  // columns of the first SPAN_ROWS of them
+} Spans;
+
+inline void spans_from(Spans *spans, const float8 record, const int2 size, const int skipped) {
+  const TileRows rows = tile_rows(record, size);
+  int8 begin, end;
+  tile_spans(&rows, rows.first + skipped, &begin, &end);
+  vstore8(begin, 0, spans->begin);
+  vstore8(end, 0, spans->end);
+  spans->first = rows.first + skipped;
+  spans->rows = rows.end - rows.first - skipped;
+}
+
+// Slots are handed out in depth order: order[i] owns offsets[i] .. offsets[i + 1].
+// A batch is first fetched, then measured, then listed: records lie far apart, and only a loop that
+// does nothing but fetch keeps many of them on the way.
 __kernel void list_tiles(const int n, const int tiles, const int2 size, __global const int *order,
                          __global const int *tile_counts, __global const ulong *part_pairs,
                          __global const float *records, __global int *offsets,
                          __global int *slot_tiles, __global int *table) {
-  const int part = get_global_id(0);
+  const int part = get_global_id(0), columns = (size.x + TILE - 1) / TILE;
   const int2 range = part_range(n, part);
   __global int *counts = table + (size_t)part * tiles;
   for (int k = 0; k < tiles; ++k) counts[k] = 0;
   int slot = 0;
   for (int k = 0; k < part; ++k) slot += (int)part_pairs[k];
-  for (int i = range.x; i < range.y; ++i) {
-    const int g = order[i];
-    offsets[g] = slot;
-    if (tile_counts[g] == 0) continue;
-    const TileRows rows = tile_rows(vload8(g, records), size);
-    for (int row = rows.first; row < rows.end; ++row) {
-      const int2 span = tile_span(&rows, row);
-      for (int column = span.x; column < span.y; ++column) {
-        const int tile = row * rows.columns + column;
-        slot_tiles[slot++] = tile;
-        ++counts[tile];
+  if (part == 0) offsets[n] = 0;  // for n = 0
+  Spans batch[BATCH];
+  float8 fetched[BATCH];
+  for (int base = range.x; base < range.y; base += BATCH) {
+    const int count = min(BATCH, range.y - base);
+    for (int j = 0; j < count; ++j) fetched[j] = vload8(order[base + j], records);
+    for (int j = 0; j < count; ++j) {
+      spans_from(&batch[j], fetched[j], size, 0);
+      if (tile_counts[order[base + j]] == 0) batch[j].rows = 0;
+    }
+    for (int j = 0; j < count; ++j) {
+      offsets[base + j] = slot;
+      Spans *spans = &batch[j];
+      for (int done = 0; spans->rows > 0;) {
+        for (int k = 0; k < min(SPAN_ROWS, spans->rows); ++k)
+          for (int column = spans->begin[k]; column < spans->end[k]; ++column) {
+            const int tile = (spans->first + k) * columns + column;
+            slot_tiles[slot++] = tile;
+            ++counts[tile];
+          }
+        if (spans->rows <= SPAN_ROWS) break;
+        done += SPAN_ROWS;
+        spans_from(spans, fetched[j], size, done);
       }
     }
   }
+  if (range.y == n) offsets[n] = slot;
 }
 
 // ranges[tile] = first and end position; run between scan_table and move_to_tiles.
@@ -104,15 +135,15 @@ __kernel void find_ranges(const int tiles, const int pairs, __global const int *
 }
 
 __kernel void move_to_tiles(const int n, const int tiles, __global const int *order,
-                            __global const int *tile_counts, __global const int *offsets,
-                            __global const int *slot_tiles, __global int *table,
-                            __global int *sorted_ids, __global int *slot_positions) {
+                            __global const int *offsets, __global const int *slot_tiles,
+                            __global int *table, __global int *sorted_ids,
+                            __global int *slot_positions) {
   const int part = get_global_id(0);
   const int2 range = part_range(n, part);
   __global int *next = table + (size_t)part * tiles;
   for (int i = range.x; i < range.y; ++i) {
-    const int g = order[i], begin = offsets[g], end = begin + tile_counts[g];
-    for (int slot = begin; slot < end; ++slot) {
+    const int g = order[i], end = offsets[i + 1];
+    for (int slot = offsets[i]; slot < end; ++slot) {
       const int to = next[slot_tiles[slot]]++;
       sorted_ids[to] = g;
       slot_positions[slot] = to;

@@ -36,9 +36,7 @@ class TileLists:
     order: cla.Array
     """[n] Gaussians by depth, ties by index."""
     offsets: cla.Array
-    """[n] first slot of each Gaussian."""
-    counts: cla.Array
-    """[n] slots of each Gaussian."""
+    """[n + 1] first slot of each Gaussian, in the order of `order`."""
     pairs: int
 
 
@@ -71,7 +69,7 @@ class Binning:
         part_pairs = device.empty((self.parts,), np.uint64)
         device.launch(kernels.count_pairs, self.parts, n, order, tile_counts, part_pairs, group=1)
         pairs = self._checked(int(part_pairs.get().sum()))
-        offsets, slot_tiles = device.empty((max(n, 1),), np.int32), self._ints(pairs)
+        offsets, slot_tiles = self._ints(n + 1), self._ints(pairs)
         table = self._ints(self.parts * tiles)
         device.launch(
             kernels.list_tiles, self.parts, n, tiles, size, order, tile_counts, part_pairs,
@@ -82,10 +80,10 @@ class Binning:
         device.launch(kernels.find_ranges, tiles, tiles, pairs, table, ranges, group=64)
         ids, positions = self._ints(pairs), self._ints(pairs)
         device.launch(
-            kernels.move_to_tiles, self.parts, n, tiles, order, tile_counts, offsets, slot_tiles,
+            kernels.move_to_tiles, self.parts, n, tiles, order, offsets, slot_tiles,
             table, ids, positions, group=1,
         )  # fmt: skip
-        return TileLists(ranges, ids, positions, order, offsets, tile_counts, pairs)
+        return TileLists(ranges, ids, positions, order, offsets, pairs)
 
     def _depth_order(self, keys: cla.Array) -> cla.Array:
         """Indices by ascending key, ties by index (radix sort, least significant digit first)."""

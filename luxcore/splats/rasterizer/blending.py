@@ -63,13 +63,14 @@ class Blending:
         touched = device.zeros((pairs,), np.uint8)
         device.launch(
             self._program("backward", with_depth).raster_backward, tiles * self._group,
-            _size(out.camera), columns, lists.ranges, lists.sorted_ids, out.saved.records, out.inputs.colors, out.saved.used, out.image, out.alpha, out.depth,
-            d_image, d_alpha, d_depth, partials, touched, group=self._group,
+            _size(out.camera), columns, lists.ranges, lists.sorted_ids, out.saved.records,
+            out.inputs.colors, out.saved.used, out.image, out.alpha, out.depth, d_image, d_alpha,
+            d_depth, partials, touched, group=self._group,
         )  # fmt: skip
         moments, d_colors = device.empty((n, 8)), device.empty((n, self.config.channels))
         gather = device.program("gather_partials", self._defines(with_depth)).gather_partials
         device.launch(
-            gather, n, n, lists.order, lists.offsets, lists.counts, lists.slot_positions, partials,
+            gather, n, n, lists.order, lists.offsets, lists.slot_positions, partials,
             touched, moments, d_colors, group=64,
         )  # fmt: skip
         return moments, d_colors

@@ -59,5 +59,5 @@ class RasterConfig:
         }
 
     def partial_size(self, with_depth: bool) -> int:
-        """Floats of one row of partial gradients: moments, colours and depth, rounded up to whole float4."""
+        """Floats of a row of partial gradients: moments, colours, depth; whole float4s."""
         return -(-(MOMENTS + self.channels + with_depth) // 4) * 4

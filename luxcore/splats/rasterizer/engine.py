@@ -17,6 +17,8 @@ from luxcore.splats.rasterizer.output import (
     SavedForBackward,
 )
 
+LANES = {"block": 16, "pixel": 1}
+"""Gaussians that one work-item projects."""
 GROUP = 64
 
 
@@ -25,8 +27,10 @@ class Rasterizer:
 
     def __init__(self, device: Device, config: RasterConfig) -> None:
         self.device, self.config = device, config
-        self._projection = device.program("projection", config.defines())
-        self._projection_backward = device.program("projection_backward", config.defines())
+        self._lanes = LANES[device.mapping]
+        defines = config.defines() | {"LANES": self._lanes}
+        self._projection = device.program("projection", defines)
+        self._projection_backward = device.program("projection_backward", defines)
         self._binning = Binning(device, config)
         self._blending = Blending(device, config)
 
@@ -46,7 +50,7 @@ class Rasterizer:
         records, radii = device.empty((n, 8)), device.empty((n,), np.int32)
         depth_keys, tile_counts = device.empty((n,), np.uint32), device.empty((n,), np.int32)
         device.launch(
-            self._projection.project_gaussians, n, n, *_camera_arguments(camera), means, quats,
+            self._projection.project_gaussians, -(-n // self._lanes), n, *_camera_arguments(camera), means, quats,
             log_scales, opacity_logits, records, depth_keys, tile_counts, radii, group=GROUP,
         )  # fmt: skip
         lists = self._binning(camera, records, depth_keys, tile_counts)
@@ -74,7 +78,7 @@ class Rasterizer:
             visible=device.empty((n,), np.uint8),
         )
         device.launch(
-            self._projection_backward.project_gaussians_backward, n, n,
+            self._projection_backward.project_gaussians_backward, -(-n // self._lanes), n,
             *_camera_arguments(out.camera), inputs.means, inputs.quats, inputs.log_scales,
             inputs.opacity_logits, out.radii, moments, gradients.means, gradients.quats,
             gradients.log_scales, gradients.opacity_logits, gradients.mean2d_norm,
