@@ -206,3 +206,24 @@ def test_library_is_not_older_than_its_known_holes():
     version = tuple(int(n) for n in OpenEXR.__version__.split(".")[:3])
     # SECURITY.md of OpenEXR: 38 advisories are closed from here on.
     assert version >= (3, 4, 14)
+
+
+def test_environments_with_damage_are_refused_and_suns_are_kept(tmp_path):
+    from luxcore.render.hdri import mean_luminance
+
+    sky = np.full((8, 16, 3), 0.5)
+    sky[2, 3] = 1e5
+    write_exr(tmp_path / "sun.exr", {"sky": sky}, half=False)
+    assert mean_luminance(tmp_path / "sun.exr") > 100
+    write_exr(tmp_path / "black.exr", {"sky": np.zeros((8, 16, 3))})
+    with pytest.raises(InputError, match=r"black\.exr"):
+        mean_luminance(tmp_path / "black.exr")
+    # A sky with a NaN cannot be written by us: take the bytes of a finite one and put it in.
+    import OpenEXR
+
+    header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage}
+    planes = {c: np.ones((8, 16), np.float32) for c in "RGB"}
+    planes["G"][1, 1] = np.nan
+    OpenEXR.File(header, planes).write(str(tmp_path / "nan.exr"))
+    with pytest.raises(FormatError, match=r"nan\.exr.*1 values that are not finite"):
+        mean_luminance(tmp_path / "nan.exr")
