@@ -26,7 +26,7 @@ def pick(rng: Rng, options: Sequence[T], weights: Sequence[float] | None = None)
     return options[int(rng.choice(len(options), p=share / share.sum()))]
 
 
-def between(rng: Rng, low: float, high: float) -> float:
+def between(rng: Rng, low: float | int, high: float | int) -> float:
     """Uniform in [low, high], rounded to 0.1 mm so that JSON stays short."""
     return round(float(rng.uniform(low, high)), 4)
 

@@ -30,7 +30,7 @@ def _living(rng: Rng, layout: Layout, palette: Palette) -> None:
     if seat is not None:
         low = tables.coffee_table(rng, palette)
         reach = seat.piece.depth / 2 + 0.4 + low.depth / 2
-        layout.in_the_open(low, seat.beside(0, reach), seat.yaw_deg)
+        layout.in_the_open(low, seat.beside(0.0, reach), seat.yaw_deg)
         side = tables.side_table(rng, palette)
         for sign in (1, -1):
             dx = sign * (seat.piece.width / 2 + side.width / 2 + 0.06)

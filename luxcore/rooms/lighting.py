@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from luxcore.rooms.colors import TEMPERATURE_K, black_body, jittered
+from luxcore.light.blackbody import blackbody_rgb, jitter_hsv
 from luxcore.rooms.dice import Rng, between, chance, pick
 from luxcore.rooms.lamps import ceiling, standing, wall
 from luxcore.rooms.lamps.design import LampPiece
@@ -14,6 +14,9 @@ from luxcore.rooms.model import Lamp, LampKind, Part, Spot
 from luxcore.rooms.palette import Palette
 from luxcore.rooms.piece import Piece, moved, placed
 from luxcore.rooms.shapes import Vec3
+
+TEMPERATURE_K = (2700.0, 6500.0)
+"""Black-body range of lamps: warm filament bulbs to daylight tubes."""
 
 POWER_W: dict[str, tuple[float, float]] = {
     "ceiling": (18.0, 60.0),
@@ -60,7 +63,7 @@ class Fittings:
                 center,
                 power,
                 temperature,
-                jittered(rng, black_body(temperature)),
+                _color(rng, temperature),
                 not chance(rng, off_probability),
             )
         )
@@ -158,6 +161,11 @@ def _add_table(rng: Rng, layout: Layout, palette: Palette, fittings: Fittings, o
         _, at, yaw = pick(rng, surfaces)
         fittings.on_tops.add(at)
         fittings.add(rng, "table", piece, at, yaw + between(rng, -25, 25), off)
+
+
+def _color(rng: Rng, temperature_k: float) -> Vec3:
+    r, g, b = jitter_hsv(blackbody_rgb(temperature_k), rng).round(5).tolist()
+    return (r, g, b)
 
 
 def _middle(piece: LampPiece, at: Vec3, yaw_deg: float) -> Vec3:

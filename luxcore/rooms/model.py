@@ -88,7 +88,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Lamp:
-    """One switch. Power in watts of light; `color` is linear RGB with mean 1 over luminance."""
+    """One switch. Power in watts of light; `color` is linear Rec.709 of luminance about 1."""
 
     id: int
     name: str
@@ -191,7 +191,14 @@ def _part(value: dict[str, Any]) -> Part:
     shape = dict(fields.pop("shape"))
     kinds = {
         s.__name__: s
-        for s in (shapes.Box, shapes.Lathe, shapes.Ellipsoid, shapes.Prism, shapes.Drape)
+        for s in (
+            shapes.Box,
+            shapes.Lathe,
+            shapes.Ellipsoid,
+            shapes.Prism,
+            shapes.Drape,
+            shapes.Polygons,
+        )
     }
     kind = kinds[shape.pop("type")]
     return Part(shape=kind(**_fields(shape)), **_fields(fields))

@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from luxcore.rooms.dice import Rng, between, chance, pick
 from luxcore.rooms.shapes import Vec2, Vec3
 
@@ -155,7 +153,7 @@ def _shape(
             (cut_x, depth),
             (0.0, depth),
         )
-        rects = (Rect(0, 0, cut_x, depth), Rect(cut_x, 0, width, cut_y))
+        rects = (Rect(0.0, 0.0, cut_x, depth), Rect(cut_x, 0.0, width, cut_y))
     elif form == "alcove":
         left = round(width * between(rng, 0.15, 0.35), 3)
         right = round(left + width * between(rng, 0.3, 0.45), 3)
@@ -170,10 +168,10 @@ def _shape(
             (left, depth),
             (0.0, depth),
         )
-        rects = (Rect(0, 0, width, depth), Rect(left, depth, right, deep))
+        rects = (Rect(0.0, 0.0, width, depth), Rect(left, depth, right, deep))
     else:
         outline = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
-        rects = (Rect(0, 0, width, depth),)
+        rects = (Rect(0.0, 0.0, width, depth),)
     return _turned(rects, outline, chance(rng, 0.5))
 
 
@@ -192,5 +190,6 @@ def rect_around(center: Vec2, width: float, depth: float, yaw_deg: float) -> Rec
     """The axis-aligned rectangle round a turned footprint."""
     yaw = math.radians(yaw_deg)
     c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
-    half = np.array([c * width + s * depth, s * width + c * depth]) / 2
-    return Rect(center[0] - half[0], center[1] - half[1], center[0] + half[0], center[1] + half[1])
+    half_x, half_y = (c * width + s * depth) / 2, (s * width + c * depth) / 2
+    x, y = center
+    return Rect(x - half_x, y - half_y, x + half_x, y + half_y)

@@ -14,8 +14,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-Vec2 = tuple[float, float]
-Vec3 = tuple[float, float, float]
+Vec2 = tuple[float | int, float | int]
+Vec3 = tuple[float | int, float | int, float | int]
+"""Lengths in metres or angles in degrees; whole numbers may be written without a point."""
+
 Faces = tuple[tuple[int, ...], ...]
 
 
@@ -171,7 +173,19 @@ class Drape:
         return Mesh(vertices, faces)
 
 
-Shape = Box | Lathe | Ellipsoid | Prism | Drape
+@dataclass(frozen=True)
+class Polygons:
+    """Any mesh as it comes: what an imported room is made of."""
+
+    vertices: tuple[Vec3, ...]
+    faces: Faces
+
+    def mesh(self) -> Mesh:
+        """The same vertices and faces."""
+        return Mesh(np.array(self.vertices, float).reshape(-1, 3), self.faces)
+
+
+Shape = Box | Lathe | Ellipsoid | Prism | Drape | Polygons
 
 
 def cylinder(radius: float, height: float, base: float = 0.0, segments: int = 24) -> Lathe:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from luxcore.rooms.dice import Rng, between, chance, pick
@@ -118,8 +119,6 @@ def _ceiling(rng: Rng, plan: FloorPlan, palette: Palette) -> list[Part]:
 
 def _sloping_ceiling(plan: FloorPlan) -> Part:
     """A slab turned about x, so that its lower face rises from `slope_low` to `height`."""
-    import math
-
     box = plan.bounds
     run, rise = box.y1 - box.y0, plan.height - plan.slope_low
     length = math.hypot(run, rise) + 1.0

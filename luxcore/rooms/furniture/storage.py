@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from luxcore.rooms.dice import Rng, between, chance, pick
 from luxcore.rooms.model import Part
 from luxcore.rooms.palette import Palette, tone
@@ -217,8 +219,6 @@ def plant(rng: Rng, palette: Palette) -> Piece:
         out = between(rng, 0.03, 0.26)
         yaw = between(rng, 0.0, 360.0)
         leaf = Ellipsoid((length / 2, length / 5, 0.006), 10)
-        import math
-
         at = (out * math.cos(math.radians(yaw)), out * math.sin(math.radians(yaw)), z)
         parts.append(
             part(

@@ -8,7 +8,7 @@ from luxcore.rooms.dice import Rng, between, pick
 from luxcore.rooms.lamps.design import Beam, Design, LampPiece, glow, hood, shade, solid
 from luxcore.rooms.model import Part
 from luxcore.rooms.palette import Palette
-from luxcore.rooms.shapes import Box, Ellipsoid, cylinder
+from luxcore.rooms.shapes import Box, Ellipsoid, Lathe, cylinder, disc
 
 
 def _cord(rng: Rng, palette: Palette, drop: float) -> list[Part]:
@@ -143,8 +143,6 @@ def linear(rng: Rng, palette: Palette) -> LampPiece:
 def bowl(rng: Rng, palette: Palette) -> LampPiece:
     """An opaque bowl that lights the ceiling: indirect."""
     drop, r = between(rng, 0.35, 0.6), between(rng, 0.18, 0.26)
-    from luxcore.rooms.shapes import Lathe, disc
-
     shell = Lathe(((0.0, -drop - r * 0.6), (r * 0.6, -drop - r * 0.45), (r, -drop)), 28)
     parts = [
         *_cord(rng, palette, drop),

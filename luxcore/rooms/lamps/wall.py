@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from luxcore.rooms.dice import Rng, between, pick
 from luxcore.rooms.lamps.design import Beam, Design, LampPiece, glow, solid
 from luxcore.rooms.palette import Palette
-from luxcore.rooms.shapes import Box, Ellipsoid, Lathe, cylinder, disc
+from luxcore.rooms.shapes import Box, Ellipsoid, Lathe, Prism, cylinder, disc
 
 
 def up_down(rng: Rng, palette: Palette) -> LampPiece:
@@ -38,8 +40,6 @@ def half_drum(rng: Rng, palette: Palette) -> LampPiece:
     side = between(rng, 0.4, 0.7)
     half = Lathe(((r, -tall / 2), (r * 0.85, tall / 2)), 16, 180.0)
     ends = [(x, y) for x, y in _half_circle(r * 0.95)]
-    from luxcore.rooms.shapes import Prism
-
     lid = Prism(tuple(ends), 0.002)
     parts = (
         glow("shade", half, side, (0, 0.01, 0)),
@@ -82,8 +82,6 @@ def swing_spot(rng: Rng, palette: Palette) -> LampPiece:
     metal = palette.metal()
     at = (0.0, 0.13, 0.0)
     lean = between(rng, 10, 35)
-    import math
-
     aim = (0.0, math.sin(math.radians(lean)), -math.cos(math.radians(lean)))
     turn = (lean, 0.0, 0.0)
     parts = (
@@ -104,8 +102,6 @@ def swing_spot(rng: Rng, palette: Palette) -> LampPiece:
 
 
 def _half_circle(radius: float, count: int = 12) -> list[tuple[float, float]]:
-    import math
-
     return [
         (
             round(radius * math.cos(math.pi * k / count), 5),
