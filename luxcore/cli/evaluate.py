@@ -42,6 +42,18 @@ import click
     type=click.IntRange(32, 1024),
     help="Side of a photo in pixels.",
 )
+@click.option(
+    "--public-cases",
+    default=None,
+    type=click.Path(path_type=Path),
+    help="paper_eval_cases.json of the public dataset: score the paper's own cases.",
+)
+@click.option(
+    "--public-cameras",
+    default=None,
+    type=click.Path(path_type=Path),
+    help="camera_params_48.json of the public dataset, with --public-cases.",
+)
 @click.option("--sv-weights", default=None, type=click.Path(path_type=Path))
 @click.option("--mv-weights", default=None, type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
@@ -52,26 +64,29 @@ def command(
     cases: int,
     groups: int,
     size: int,
+    public_cases: Path | None,
+    public_cameras: Path | None,
     sv_weights: Path | None,
     mv_weights: Path | None,
     seed: int,
     as_json: bool,
 ) -> None:
     """Score the models on DATASET and print both tables, in the paper's form."""
+    from luxcore.errors import InputError
     from luxcore.evaluate.dataset import evaluation_views
+    from luxcore.evaluate.public_run import evaluate_public
     from luxcore.evaluate.run import evaluate_models
     from luxcore.settings.evaluate import EvaluateSettings
 
     settings = EvaluateSettings(cases=cases, groups=groups, size_px=size)
-    metrics = evaluate_models(
-        evaluation_views(dataset),
-        [],
-        out,
-        settings,
-        sv_weights=sv_weights,
-        mv_weights=mv_weights,
-        seed=seed,
-    )
+    weights = {"sv_weights": sv_weights, "mv_weights": mv_weights}
+    if (public_cases is None) != (public_cameras is None):
+        raise InputError("--public-cases and --public-cameras go together.")
+    if public_cases is not None and public_cameras is not None:
+        metrics = evaluate_public(dataset, public_cases, public_cameras, out, settings, **weights)
+    else:
+        views = evaluation_views(dataset)
+        metrics = evaluate_models(views, [], out, settings, seed=seed, **weights)
     if as_json:
         import json
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from luxcore.data.crops import LitCrop, ViewSource, with_lamps
 from luxcore.data.panorama import view_rotation
@@ -129,40 +130,49 @@ def public_cases(
     return cases
 
 
-def public_groups(
-    dataset: Path,
-    listed: CaseList,
-    cameras: dict[str, SceneCameras],
-    side_px: int = PUBLIC_SIDE_PX,
-) -> list[list[LitCrop]]:
-    """Per scene the reference photo and then the scored ones: 15 in the paper's list, one pass."""
-    groups = []
-    with progress("public scenes", len(listed.scenes), "scenes") as bar:
-        for scored, scene in _opened(dataset, listed, cameras):
-            groups.append(_group(scene, scored, listed, cameras[scored.scene_id], side_px))
-            bar.advance()
-    return groups
+class PublicGroups(Sequence[list[LitCrop]]):
+    """Per scene the reference photo and then the scored ones: 15 in the paper's list, one pass.
 
+    A scene is read when it is asked for, and not kept: all of them would not fit in memory.
+    """
 
-def _group(
-    scene: PublicScene,
-    scored: ScoredScene,
-    listed: CaseList,
-    cameras: SceneCameras,
-    side_px: int,
-) -> list[LitCrop]:
-    wanted = [REFERENCE_VIEW, *listed.multi_views]
-    missing = [number for number in wanted if number not in cameras.multi]
-    if missing:
-        raise InputError(f"the cameras of scene {scored.scene_id} lack view {missing[0]}.")
-    lamps, photos = _lamps(scene, scored), {}
-    for view in sorted({cameras.multi[number].view for number in wanted}):
-        source = ViewSource(scene.read_view(view))
-        for number in wanted:
-            if cameras.multi[number].view == view:
-                crop = cameras.multi[number].cut(source, side_px)
-                photos[number] = with_lamps(crop, lamps)
-    return [photos[number] for number in wanted]
+    def __init__(
+        self,
+        dataset: Path,
+        listed: CaseList,
+        cameras: dict[str, SceneCameras],
+        side_px: int = PUBLIC_SIDE_PX,
+    ) -> None:
+        """Raises InputError naming what is missing, before a picture is read."""
+        self._scenes = _opened(dataset, listed, cameras)
+        self._wanted = (REFERENCE_VIEW, *listed.multi_views)
+        self._cameras, self._side_px = cameras, side_px
+        for scored, scene in self._scenes:
+            _lamps(scene, scored)
+            known = cameras[scored.scene_id].multi
+            missing = [number for number in self._wanted if number not in known]
+            if missing:
+                raise InputError(f"the cameras of scene {scored.scene_id} lack view {missing[0]}.")
+
+    def __len__(self) -> int:
+        return len(self._scenes)
+
+    @overload
+    def __getitem__(self, index: int) -> list[LitCrop]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[list[LitCrop]]: ...
+    def __getitem__(self, index: int | slice) -> list[LitCrop] | list[list[LitCrop]]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(len(self))[index]]
+        scored, scene = self._scenes[index]
+        cameras, lamps = self._cameras[scored.scene_id].multi, _lamps(scene, scored)
+        photos = {}
+        for view in sorted({cameras[number].view for number in self._wanted}):
+            source = ViewSource(scene.read_view(view))
+            for number in self._wanted:
+                if cameras[number].view == view:
+                    photos[number] = with_lamps(cameras[number].cut(source, self._side_px), lamps)
+        return [photos[number] for number in self._wanted]
 
 
 def _opened(

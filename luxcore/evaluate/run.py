@@ -41,7 +41,7 @@ def evaluate_models(
 ) -> dict[str, float]:
     """Both tables on held-out `views` (stems of rendered views) and `captures` (capture folder,
     masks folder); writes tables/, pictures/ and metrics.json into `out`, returns the metrics."""
-    models = _open(settings, sv_weights, mv_weights)
+    models = open_models(settings, sv_weights, mv_weights)
     metrics = _evaluate_single(views, models.decomposer, out, settings, seed) if views else {}
     groups = multi_groups(views, captures, settings, seed)
     if groups:
@@ -69,9 +69,10 @@ def multi_groups(
     return [g for g in groups if g is not None and len(g) > 1 and g[0].masks.any()]
 
 
-def _open(
+def open_models(
     settings: EvaluateSettings, sv_weights: Path | None, mv_weights: Path | None
 ) -> MultiModels:
+    """The backends that the settings name, ready to be scored."""
     opening = BackendSettings(
         sv_weights=str(sv_weights) if sv_weights else None,
         mv_weights=str(mv_weights) if mv_weights else None,

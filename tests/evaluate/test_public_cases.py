@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,19 @@ import pytest
 from luxcore.data.crops import ViewSource
 from luxcore.data.public_writer import write_scene, write_shards
 from luxcore.errors import FormatError, InputError
+from luxcore.evaluate import public_run
+from luxcore.evaluate.multi import MultiModels
 from luxcore.evaluate.public_cases import (
     CaseList,
     PublicCamera,
+    PublicGroups,
     SceneCameras,
     public_cases,
-    public_groups,
     read_cameras,
     read_case_list,
 )
+from luxcore.models.interface import Decomposition, Geometry, Reference, View
+from luxcore.settings.evaluate import EvaluateSettings
 from tests.models_paper.room import panorama
 
 SIDE = 48
@@ -95,7 +100,7 @@ def test_lamps_that_are_not_listed_are_part_of_the_ambient_light(
 def test_groups_begin_with_the_reference_and_keep_the_list_s_order(
     dataset: Path, listed: tuple[CaseList, dict[str, SceneCameras]]
 ) -> None:
-    [group] = public_groups(dataset, *listed, side_px=SIDE)
+    [group] = PublicGroups(dataset, *listed, side_px=SIDE)
     assert len(group) == 3
     reference = public_cases(dataset, *listed, side_px=SIDE)[0].crop
     np.testing.assert_array_equal(group[0].image_linear, reference.image_linear)
@@ -161,7 +166,7 @@ def test_missing_scenes_lamps_and_views_are_named(
         public_cases(dataset, lamp, cameras)
     views = replace(both, multi_views=(31,))
     with pytest.raises(InputError, match="lack view 31"):
-        public_groups(dataset, views, cameras)
+        PublicGroups(dataset, views, cameras)
 
 
 @pytest.mark.parametrize(
@@ -199,3 +204,48 @@ def test_bad_cameras_are_refused(tmp_path: Path, entry: Any) -> None:
         read_cameras(path)
     with pytest.raises(InputError, match="does not exist"):
         read_cameras(tmp_path / "none.json")
+
+
+class Copying:
+    """Says that each lamp's light is the photo itself."""
+
+    name = "copying"
+
+    def decompose(
+        self,
+        image_linear: np.ndarray,
+        masks: np.ndarray,
+        on: np.ndarray,
+        geometry: Geometry | None,
+        seed: int,
+    ) -> Decomposition:
+        scale = np.repeat(on[:, None], 3, axis=1).astype(np.float32)
+        return Decomposition(0 * image_linear, np.stack([image_linear] * len(masks)), scale)
+
+    def run_pass(
+        self, views: Sequence[View], references: Sequence[Reference], seed: int
+    ) -> list[Decomposition]:
+        return [self.decompose(v.image_linear, v.masks, v.on, None, seed) for v in views]
+
+
+def test_both_tables_are_made_on_the_listed_cases(
+    tmp_path: Path, dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models = MultiModels(Copying(), Copying(), None)
+    monkeypatch.setattr(public_run, "open_models", lambda *_: models)
+    scenes = {"014649": {"view_id": "0001", "pass_ids": ["1001"]}}
+    (tmp_path / "cases.json").write_text(json.dumps({**LIST, "scenes": scenes}))
+    (tmp_path / "cameras.json").write_text(json.dumps(cameras_of()))
+    metrics = public_run.evaluate_public(
+        dataset,
+        tmp_path / "cases.json",
+        tmp_path / "cameras.json",
+        tmp_path / "out",
+        EvaluateSettings(size_px=64),
+    )
+    assert (metrics["public_cases"], metrics["public_images"]) == (1, 2)
+    single = json.loads((tmp_path / "out" / "tables" / "public_single.json").read_text())
+    multi = json.loads((tmp_path / "out" / "tables" / "public_multi.json").read_text())
+    assert {row["count"] for row in single["rows"]} == {1}
+    assert {row["count"] for row in multi["rows"]} == {2}
+    assert all(np.isfinite(value) for value in metrics.values())
