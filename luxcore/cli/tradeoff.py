@@ -13,9 +13,6 @@ from luxcore.errors import InputError
 if TYPE_CHECKING:
     from luxcore.tradeoff.sweep import Sweep
 
-if TYPE_CHECKING:
-    pass
-
 QUALITIES = ("low", "default", "high")
 
 
