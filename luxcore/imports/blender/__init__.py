@@ -1,0 +1,1 @@
+"""What runs inside the Blender process that reads scene files; nothing else may import bpy."""
