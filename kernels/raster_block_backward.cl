@@ -11,6 +11,7 @@
 #define FEATURES (CHANNELS + WITH_DEPTH)
 #define MOMENTS 6
 #define SUMS (MOMENTS + FEATURES)
+#define FEATURE_GROUP 12
 #define SUM_VECTORS ((SUMS + 15) / 16)
 #include "block_chunk.cl"
 #line 17 "raster_block_backward.cl"
@@ -35,33 +36,52 @@ inline float16 sum_lanes(const float16 *v) {
   return fold(fold(a, b), fold(c, d));
 }
 
-inline void blend_backward(Block *block, const float8 r, const float *features, const float16 px,
-                           const float16 py, float16 *sums) {
+// Sums the moments; returns the weights, for the features' gradients.
+inline __attribute__((always_inline)) float16 blend_backward(
+    Block *block, const float8 r, const float *features, const float16 px, const float16 py,
+    float16 *moments) {
   const float16 dx = RECORD_X(r) - px, dy = RECORD_Y(r) - py;
-  const float16 p = log2_alpha_block(r, dx, dy);
-  const float16 alpha = alpha_block(p);
+  const float16 alpha = alpha_block(log2_alpha_block(r, dx, dy));
   const float16 T = block->T, after = fma(-alpha, T, T);
   const int16 drawn = after >= TRANSMITTANCE_MIN;
   const float16 weight = drawn ? alpha * T : (float16)(0.0f);
   block->T = drawn ? after : (float16)(0.0f);
-  float16 s = block->d_alpha;
+  // Four sums, as one long chain of additions would wait for itself.
+  float16 s[4] = {block->d_alpha, (float16)(0.0f), (float16)(0.0f), (float16)(0.0f)};
 #pragma unroll
-  for (int k = 0; k < FEATURES; ++k) {
-    s = fma((float16)(features[k]), block->d_features[k], s);
-    sums[MOMENTS + k] = fma(weight, block->d_features[k], sums[MOMENTS + k]);
-  }
-  const float16 own = weight * s;
+  for (int k = 0; k < FEATURES; ++k)
+    s[k & 3] = fma((float16)(features[k]), block->d_features[k], s[k & 3]);
+  const float16 own = weight * ((s[0] + s[1]) + (s[2] + s[3]));
   block->rest -= own;
   const float16 slope = own - block->rest * (alpha / (1.0f - alpha));
   // Where alpha is at its ceiling it does not move with the Gaussian.
   const float16 h = drawn && alpha < ALPHA_MAX ? slope : (float16)(0.0f);
   const float16 hx = h * dx, hy = h * dy;
-  sums[0] += h;
-  sums[1] += hx;
-  sums[2] += hy;
-  sums[3] = fma(hx, dx, sums[3]);
-  sums[4] = fma(hx, dy, sums[4]);
-  sums[5] = fma(hy, dy, sums[5]);
+  moments[0] += h;
+  moments[1] += hx;
+  moments[2] += hy;
+  moments[3] = fma(hx, dx, moments[3]);
+  moments[4] = fma(hx, dy, moments[4]);
+  moments[5] = fma(hy, dy, moments[5]);
+  return weight;
+}
+
+// sums[k] = sum over the blocks in `left` of weight times d_features[first + k].
+inline __attribute__((always_inline)) void sum_features(const Block *blocks,
+                                                        const float16 *weights, uint left,
+                                                        const int first, const int count,
+                                                        float16 *sums) {
+  float16 own[FEATURE_GROUP];
+#pragma unroll
+  for (int k = 0; k < FEATURE_GROUP; ++k) own[k] = (float16)(0.0f);
+  for (; left; left &= left - 1) {
+    const int b = popcount(~left & (left - 1));
+    const float16 weight = weights[b];
+#pragma unroll
+    for (int k = 0; k < count; ++k) own[k] = fma(weight, blocks[b].d_features[first + k], own[k]);
+  }
+#pragma unroll
+  for (int k = 0; k < count; ++k) sums[k] = own[k];
 }
 
 // Lanes outside the image start finished, with zero gradients.
@@ -110,6 +130,7 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
   for (int b = 0; b < BLOCKS; ++b)
     read_block(&blocks[b], x0 + (b & 3) * 4, y0 + (b >> 2) * 4, size, image, alpha, depth, d_image,
                d_alpha, d_depth);
+  float16 weights[BLOCKS];
   float16 px[4], py[4];  // pixel centres of a column and of a row of blocks
   for (int k = 0; k < 4; ++k) {
     px[k] = x0 + 4 * k + 0.5f + LANE_X;
@@ -126,11 +147,16 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
       float16 sums[SUM_VECTORS * 16];
 #pragma unroll
       for (int k = 0; k < SUM_VECTORS * 16; ++k) sums[k] = (float16)(0.0f);
-      for (; left; left &= left - 1) {
-        const int b = popcount(~left & (left - 1));
-        blend_backward(&blocks[b], r, chunk.features + i * FEATURES,
-                       px[b & 3], py[b >> 2], sums);
+      // Moments first, then a few features at a time: more would not fit the registers.
+      for (uint rest = left; rest; rest &= rest - 1) {
+        const int b = popcount(~rest & (rest - 1));
+        weights[b] = blend_backward(&blocks[b], r, chunk.features + i * FEATURES, px[b & 3],
+                                    py[b >> 2], sums);
       }
+#pragma unroll
+      for (int first = 0; first < FEATURES; first += FEATURE_GROUP)
+        sum_features(blocks, weights, left, first, min(FEATURE_GROUP, FEATURES - first),
+                     sums + MOMENTS + first);
       const int row = begin + i;
       touched[row] = 1;
       float total[SUM_VECTORS * 16];
