@@ -6,14 +6,7 @@ import numpy as np
 import torch
 
 from luxcore.cameras import Camera, look_at
-from luxcore.models.small.features import (
-    MV_CHANNELS,
-    SV_CHANNELS,
-    Surfaces,
-    lamp_centres,
-    lamp_features,
-    lambert_terms,
-)
+from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
 from luxcore.models.small.multiview import (
     KnownLight,
     TargetView,
@@ -21,7 +14,7 @@ from luxcore.models.small.multiview import (
     multiview_features,
     pluecker,
 )
-from luxcore.models.small.surfaces import surfaces_of
+from luxcore.models.small.surfaces import Surfaces, lambert_terms, lamp_centres, surfaces_of
 
 
 def wall(camera: Camera, distance_m: float = 2.0) -> Surfaces:
@@ -33,7 +26,7 @@ def wall(camera: Camera, distance_m: float = 2.0) -> Surfaces:
 
 def camera(yaw_deg: float = 0, eye: tuple[float, float, float] = (0, 0, 1)) -> Camera:
     angle = np.radians(yaw_deg)
-    target = np.array(eye, float) + [np.cos(angle), np.sin(angle), 0]
+    target = np.add(eye, [np.cos(angle), np.sin(angle), 0.0])
     return look_at(np.array(eye, float), target, 60.0, 32, 32)
 
 

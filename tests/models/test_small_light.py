@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
-from luxcore.models.small.features import CLIPPED, PHOTO_MAX
 from luxcore.models.small.grid import fields_at_full_size, grid_size, masks_to_grid
 from luxcore.models.small.heads import (
     LightFields,
@@ -15,6 +14,7 @@ from luxcore.models.small.heads import (
     lamp_light,
     light_fields,
 )
+from luxcore.models.small.levels import CLIPPED, PHOTO_MAX
 from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS
 
 

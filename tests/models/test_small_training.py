@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -82,8 +83,8 @@ def test_resume_equals_an_unbroken_run(pool: CropPool, tmp_path: Path) -> None:
             raise StopError
         return mean_psnr(net, score)
 
+    batches = SingleBatches(pool, 5, photos=2)
     with pytest.raises(StopError):
-        batches = SingleBatches(pool, 5, photos=2)
         fit(tiny("sv"), batches, SETTINGS, stop_at_second_check, checkpoint)
     resumed = trained(pool, SETTINGS, checkpoint)
     for name, value in whole.items():
@@ -131,7 +132,7 @@ def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:
     assert shares[0] == pytest.approx(0.1)
     assert shares[50] == 1.0
     assert shares[99] == pytest.approx(1 / 40)
-    assert all(a >= b for a, b in zip(shares[60:], shares[61:], strict=False))
+    assert all(a >= b for a, b in pairwise(shares[60:]))
 
 
 def test_a_widened_network_answers_as_before(pool: CropPool) -> None:

@@ -78,7 +78,7 @@ def test_a_nonsense_shape_is_refused(weights: Path, shape: str) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="none.safetensors does not exist"):
+    with pytest.raises(InputError, match=r"none\.safetensors does not exist"):
         load_network(tmp_path / "none.safetensors", "sv")
 
 

@@ -10,10 +10,10 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
-from luxcore.models.small.features import PHOTO_MAX, Surfaces
 from luxcore.models.small.heads import WarpedLight
+from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.samples import chw
-from luxcore.models.small.surfaces import surfaces_of
+from luxcore.models.small.surfaces import Surfaces, surfaces_of
 
 LIGHT_MAX = 4_000.0
 """Lamp light above this is clipped in training: beyond every bracket, and rare."""

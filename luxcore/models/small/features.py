@@ -5,46 +5,19 @@ Directions and positions are in camera axes (OpenCV), so that turning the world 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-PHOTO_MAX = 16.3
-"""Largest linear value that an 8-bit AgX picture at EV0 can carry (docs/models.md)."""
+from luxcore.models.small.levels import display_curve
+from luxcore.models.small.prior import lambert_shares, unit_irradiance
+from luxcore.models.small.surfaces import Surfaces, lambert_terms, lamp_centres
 
-CLIPPED = 0.9 * PHOTO_MAX
-"""A pixel whose brightest channel exceeds this is clipped: its true value is unknown."""
-
-SV_CHANNELS = 27
+SV_CHANNELS = 34
 MV_CHANNELS = SV_CHANNELS + 13
-
-
-@dataclass(frozen=True)
-class Surfaces:
-    """Geometry of one photo on the network's grid; zeros where unknown.
-
-    `points` are camera-space positions in metres, `normals` unit vectors in camera axes.
-    """
-
-    points: Float[Tensor, "3 h w"]
-    normals: Float[Tensor, "3 h w"]
-
-    @property
-    def valid(self) -> Bool[Tensor, "h w"]:
-        """Where the surface is known."""
-        return (self.points[2] > 0) & (self.normals.abs().sum(0) > 0)
-
-
-def display_curve(linear: Tensor) -> Tensor:
-    """Linear light to 0..1 as the eye and AgX see it: x^a/(x^a + m^a), smooth and monotone.
-
-    A stand-in for AgX inside features and losses: mid-grey 0.18 lands at 0.48, 16 at 0.98, and the
-    gradient never dies. Reported metrics use AgX itself.
-    """
-    response = (linear.clamp_min(0) / 0.2 + 1e-6) ** 0.85
-    return response / (1 + response)
+LAMP_SHARE = slice(27, 30)
+AMBIENT_SHARE = slice(31, 34)
+"""Channels that hold the first guess at the shares of light, mapped to −1..1."""
 
 
 def lamp_features(
@@ -61,6 +34,9 @@ def lamp_features(
     they come from the mask and the depth.
     """
     k, h, w = masks.shape
+    centres, known = _centres(masks, surfaces, lamp_points)
+    irradiance = unit_irradiance(masks, surfaces, centres, known)
+    shares = lambert_shares(photo, masks, irradiance, on)
     shared = torch.cat([display_curve(photo) - 0.5, _stops(photo) / 4])
     others_on, others_off = _other_masks(masks, on)
     channels = [
@@ -71,30 +47,12 @@ def lamp_features(
         _mask_relative(masks),
         _relative_colour(photo, masks),
         on.to(photo).view(k, 1, 1, 1).expand(k, 1, h, w),
-        _geometry(masks, surfaces, lamp_points),
+        _geometry(masks, surfaces, centres, known),
+        2 * shares - 1,
+        torch.log2(irradiance[:, None] + 1e-3) / 4,
+        2 * (1 - shares.sum(0, keepdim=True)).clamp(0, 1).expand(k, -1, -1, -1) - 1,
     ]
     return torch.cat(channels, dim=1)
-
-
-def lamp_centres(
-    masks: Float[Tensor, "k h w"], surfaces: Surfaces
-) -> tuple[Float[Tensor, "k 3"], Bool[Tensor, " k"]]:
-    """Camera-space centre of what each mask covers, metres, and whether any of it has depth."""
-    weight = masks * (surfaces.points[2] > 0)
-    total = weight.sum((1, 2))
-    centres = torch.einsum("khw,chw->kc", weight, surfaces.points) / total.clamp_min(1e-6)[:, None]
-    return centres, total > 0
-
-
-def lambert_terms(
-    surfaces: Surfaces, centre: Float[Tensor, " 3"]
-) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "h w"], Float[Tensor, "h w"]]:
-    """Unit direction to the lamp, distance in metres, and cos/d² for a lamp at `centre`."""
-    offset = centre.view(3, 1, 1) - surfaces.points
-    distance = offset.norm(dim=0).clamp_min(0.05)
-    direction = offset / distance
-    cosine = (direction * surfaces.normals).sum(0).clamp_min(0)
-    return direction, distance, cosine / distance**2
 
 
 def _stops(linear: Tensor) -> Tensor:
@@ -132,17 +90,24 @@ def _relative_colour(photo: Tensor, masks: Tensor) -> Tensor:
     return (stops - lamp.view(-1, 3, 1, 1)) / 8 * seen
 
 
+def _centres(
+    masks: Tensor, surfaces: Surfaces | None, lamp_points: Tensor | None
+) -> tuple[Tensor | None, Tensor | None]:
+    """Lamp centres in camera space and which of them are known; None without geometry."""
+    if surfaces is None:
+        return None, None
+    if lamp_points is None:
+        return lamp_centres(masks, surfaces)
+    return lamp_points, lamp_points.isfinite().all(1)
+
+
 def _geometry(
-    masks: Tensor, surfaces: Surfaces | None, lamp_points: Float[Tensor, "k 3"] | None
+    masks: Tensor, surfaces: Surfaces | None, centres: Tensor | None, known: Tensor | None
 ) -> Tensor:
     """[k 11 h w]: normal, inverse depth, direction to lamp, distance, cosine term, flags."""
     k, h, w = masks.shape
-    if surfaces is None:
+    if surfaces is None or centres is None or known is None or not k:
         return masks.new_zeros(k, 11, h, w)
-    if lamp_points is None:
-        centres, known = lamp_centres(masks, surfaces)
-    else:
-        centres, known = lamp_points, lamp_points.isfinite().all(1)
     return torch.stack([_one_geometry(surfaces, centres[i], bool(known[i])) for i in range(k)])
 
 

@@ -9,10 +9,10 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.interface import Geometry
-from luxcore.models.small.features import PHOTO_MAX, Surfaces
 from luxcore.models.small.heads import LightFields
+from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.samples import chw
-from luxcore.models.small.surfaces import surfaces_of
+from luxcore.models.small.surfaces import Surfaces, surfaces_of
 
 GUIDE_RADIUS = 2
 GUIDE_SMOOTHNESS = 0.05

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from luxcore.models.small.features import CLIPPED
+from luxcore.models.small.levels import CLIPPED
 from luxcore.models.small.network import SV_OUTPUTS
 
 MAX_LOG_RATIO = 8.0

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from luxcore.models.small.examples import Example
-from luxcore.models.small.features import CLIPPED, display_curve
 from luxcore.models.small.heads import LightFields, lamp_light
+from luxcore.models.small.levels import CLIPPED, display_curve
 
 BRACKETS = ((1.0, 1.0), (0.25, 0.5), (0.0625, 0.25))
 """(exposure, weight): EV0, EV-2, EV-4 of the paper's three brightness levels."""

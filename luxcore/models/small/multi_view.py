@@ -13,7 +13,6 @@ from torch import Tensor
 from luxcore.cameras import Camera
 from luxcore.errors import InputError
 from luxcore.models.interface import MAX_VIEWS_PER_PASS, Decomposition, Reference, View
-from luxcore.models.small.features import Surfaces
 from luxcore.models.small.grid import (
     geometry_to_grid,
     grid_size,
@@ -25,6 +24,7 @@ from luxcore.models.small.multiview import KnownLight, TargetView, multiview_fea
 from luxcore.models.small.network import LampNet
 from luxcore.models.small.samples import chw
 from luxcore.models.small.single_view import finish, run_network, with_unseen
+from luxcore.models.small.surfaces import Surfaces
 
 
 @dataclass(frozen=True)

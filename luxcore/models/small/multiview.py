@@ -15,9 +15,9 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.cameras import Camera
-from luxcore.models.small.features import Surfaces, lamp_centres, lamp_features
+from luxcore.models.small.features import lamp_features
 from luxcore.models.small.heads import RATIO_FLOOR, WarpedLight
-from luxcore.models.small.surfaces import pixel_rays
+from luxcore.models.small.surfaces import Surfaces, lamp_centres, pixel_rays
 
 DEPTH_TOLERANCE = 0.05
 """Relative difference of depth within which two views see the same surface."""

@@ -14,6 +14,8 @@ import torch.nn.functional as fn
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from luxcore.models.small.features import AMBIENT_SHARE, LAMP_SHARE
+
 SV_OUTPUTS = 12
 """Four heads of RGB: lamp logit, ambient logit, log ratio of a lamp that is off, emitter boost."""
 
@@ -55,7 +57,7 @@ class LampNet(nn.Module):
         pairs = list(pairwise(widths))[::-1]
         self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
         self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
-        # Zero logits are an even share of the light: a sane start for every lamp.
+        # Zero corrections are the first guess itself: a sane start for every lamp.
         for parameter in self.head.parameters():
             nn.init.zeros_(parameter)
 
@@ -68,7 +70,18 @@ class LampNet(nn.Module):
         x = self.middle(x)
         for block, skip in zip(self.up, skips[-2::-1], strict=True):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
-        return fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+        outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+        return torch.cat([outputs[:, :6] + prior_logits(features), outputs[:, 6:]], dim=1)
+
+
+def prior_logits(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 6 h w"]:
+    """Logits of lamp and ambient by the Lambert fit, at half their weight: it knows no shadows.
+
+    The network's own logits are corrections of these. Halving them was best on rooms that neither
+    had seen (docs/models.md).
+    """
+    shares = torch.cat([features[:, LAMP_SHARE], features[:, AMBIENT_SHARE]], dim=1)
+    return 0.5 * torch.log((shares + 1) / 2 + 0.02)
 
 
 class Residual(nn.Module):

@@ -1,15 +1,32 @@
-"""Depth and normals of a photo, brought into camera space on a grid of any size."""
+"""Depth and normals of a photo in camera space, and how a lamp stands to them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.cameras import Camera
-from luxcore.models.small.features import Surfaces
 from luxcore.models.small.samples import chw
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Geometry of one photo on the network's grid; zeros where unknown.
+
+    `points` are camera-space positions in metres, `normals` unit vectors in camera axes.
+    """
+
+    points: Float[Tensor, "3 h w"]
+    normals: Float[Tensor, "3 h w"]
+
+    @property
+    def valid(self) -> Bool[Tensor, "h w"]:
+        """Where the surface is known."""
+        return (self.points[2] > 0) & (self.normals.abs().sum(0) > 0)
 
 
 def pixel_rays(camera: Camera) -> Float[Tensor, "3 h w"]:
@@ -33,3 +50,24 @@ def surfaces_of(
     normals = torch.einsum("ij,jhw->ihw", rotation, chw(np.nan_to_num(normal)))
     length = normals.norm(dim=0, keepdim=True)
     return Surfaces(pixel_rays(camera) * depth, normals / length.clamp_min(1e-6) * (length > 0.1))
+
+
+def lamp_centres(
+    masks: Float[Tensor, "k h w"], surfaces: Surfaces
+) -> tuple[Float[Tensor, "k 3"], Bool[Tensor, " k"]]:
+    """Camera-space centre of what each mask covers, metres, and whether any of it has depth."""
+    weight = masks * (surfaces.points[2] > 0)
+    total = weight.sum((1, 2))
+    centres = torch.einsum("khw,chw->kc", weight, surfaces.points) / total.clamp_min(1e-6)[:, None]
+    return centres, total > 0
+
+
+def lambert_terms(
+    surfaces: Surfaces, centre: Float[Tensor, " 3"]
+) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "h w"], Float[Tensor, "h w"]]:
+    """Unit direction to the lamp, distance in metres, and cos/d² for a lamp at `centre`."""
+    offset = centre.view(3, 1, 1) - surfaces.points
+    distance = offset.norm(dim=0).clamp_min(0.05)
+    direction = offset / distance
+    cosine = (direction * surfaces.normals).sum(0).clamp_min(0)
+    return direction, distance, cosine / distance**2
