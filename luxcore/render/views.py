@@ -12,6 +12,9 @@ from luxcore.cameras import Camera, camera_from_nerfstudio, camera_to_nerfstudio
 from luxcore.errors import InputError
 from luxcore.rooms.shapes import Vec3
 
+ENVIRONMENT_DISTANCE_M = 1000.0
+"""`ray_distance_m` where a ray leaves through an opening."""
+
 
 @dataclass(frozen=True)
 class PanoramaView:

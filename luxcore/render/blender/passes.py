@@ -12,9 +12,7 @@ import bpy
 import numpy as np
 
 from luxcore.render.effects import Effects
-
-ENVIRONMENT_DISTANCE_M = 1000.0
-"""`ray_distance_m` where a ray leaves through an opening."""
+from luxcore.render.views import ENVIRONMENT_DISTANCE_M
 
 
 @dataclass(frozen=True)
