@@ -10,9 +10,11 @@
 // Compile-time: CHANNELS, WITH_DEPTH, PARTIAL_SIZE, CHUNK and the constants of blending.cl.
 #define FEATURES (CHANNELS + WITH_DEPTH)
 #define MOMENTS 6
-#define SUMS (MOMENTS + FEATURES)
-#define FEATURE_GROUP 12
-#define SUM_VECTORS ((SUMS + 15) / 16)
+// Features are summed in equal groups of at most 12, which fit the registers; padding is zero.
+#define GROUPS ((FEATURES + 11) / 12)
+#define GROUP_SIZE ((FEATURES + GROUPS - 1) / GROUPS)
+#define PADDED (GROUPS * GROUP_SIZE)
+#define SUM_VECTORS ((MOMENTS + PADDED + 15) / 16)
 #include "block_chunk.cl"
 #line 17 "raster_block_backward.cl"
 
@@ -20,7 +22,7 @@ typedef struct {
   float16 T;     // 0 once the pixel is finished
   float16 rest;  // R of the next Gaussian, before it is blended
   float16 d_alpha;
-  float16 d_features[FEATURES];
+  float16 d_features[PADDED];
 } Block;
 
 inline float16 fold(const float16 a, const float16 b) {
@@ -37,9 +39,8 @@ inline float16 sum_lanes(const float16 *v) {
 }
 
 // Sums the moments; returns the weights, for the features' gradients.
-inline __attribute__((always_inline)) float16 blend_backward(
-    Block *block, const float8 r, const float *features, const float16 px, const float16 py,
-    float16 *moments) {
+inline float16 blend_backward(Block *block, const float8 r, const float *features,
+                              const float16 px, const float16 py, float16 *moments) {
   const float16 dx = RECORD_X(r) - px, dy = RECORD_Y(r) - py;
   const float16 alpha = alpha_block(log2_alpha_block(r, dx, dy));
   const float16 T = block->T, after = fma(-alpha, T, T);
@@ -67,21 +68,20 @@ inline __attribute__((always_inline)) float16 blend_backward(
 }
 
 // sums[k] = sum over the blocks in `left` of weight times d_features[first + k].
-inline __attribute__((always_inline)) void sum_features(const Block *blocks,
-                                                        const float16 *weights, uint left,
-                                                        const int first, const int count,
-                                                        float16 *sums) {
-  float16 own[FEATURE_GROUP];
+inline void sum_features(const Block *blocks, const float16 *weights, uint left, const int first,
+                         float16 *sums) {
+  float16 own[GROUP_SIZE];
 #pragma unroll
-  for (int k = 0; k < FEATURE_GROUP; ++k) own[k] = (float16)(0.0f);
+  for (int k = 0; k < GROUP_SIZE; ++k) own[k] = (float16)(0.0f);
   for (; left; left &= left - 1) {
     const int b = popcount(~left & (left - 1));
     const float16 weight = weights[b];
+    const float16 *d_features = blocks[b].d_features + first;
 #pragma unroll
-    for (int k = 0; k < count; ++k) own[k] = fma(weight, blocks[b].d_features[first + k], own[k]);
+    for (int k = 0; k < GROUP_SIZE; ++k) own[k] = fma(weight, d_features[k], own[k]);
   }
 #pragma unroll
-  for (int k = 0; k < count; ++k) sums[k] = own[k];
+  for (int k = 0; k < GROUP_SIZE; ++k) sums[k] = own[k];
 }
 
 // Lanes outside the image start finished, with zero gradients.
@@ -113,6 +113,7 @@ void read_block(Block *block, const int x0, const int y0, const int2 size,
   block->rest = vload16(0, rest);
   block->d_alpha = vload16(0, d_alphas);
   for (int k = 0; k < FEATURES; ++k) block->d_features[k] = vload16(0, d_features[k]);
+  for (int k = FEATURES; k < PADDED; ++k) block->d_features[k] = (float16)(0.0f);
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
@@ -153,10 +154,8 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
         weights[b] = blend_backward(&blocks[b], r, chunk.features + i * FEATURES, px[b & 3],
                                     py[b >> 2], sums);
       }
-#pragma unroll
-      for (int first = 0; first < FEATURES; first += FEATURE_GROUP)
-        sum_features(blocks, weights, left, first, min(FEATURE_GROUP, FEATURES - first),
-                     sums + MOMENTS + first);
+      for (int first = 0; first < PADDED; first += GROUP_SIZE)
+        sum_features(blocks, weights, left, first, sums + MOMENTS + first);
       const int row = begin + i;
       touched[row] = 1;
       float total[SUM_VECTORS * 16];
