@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 
-from luxcore.data.compact import MASK_KINDS, RenderedView
+from luxcore.data.compact import MASK_KINDS
 from luxcore.data.coverage import Pose, Sight, sight
 from luxcore.data.crops import LitCrop, with_lamps
 from luxcore.data.lighting import draw_relighting, exposed
 from luxcore.data.panorama import view_rotation
-from luxcore.data.store import ViewStore
+from luxcore.data.store import AnyView, ViewStore
 from luxcore.data.training import FOV_DEG, aimed_pose, as_arrays, generator, lamps_in_sight
 from luxcore.errors import InputError
 
@@ -36,7 +35,7 @@ class MultiViewSets:
 
     def __init__(
         self,
-        views: Sequence[Path | RenderedView],
+        views: Sequence[AnyView],
         size: tuple[int, int],
         seed: int,
         *,

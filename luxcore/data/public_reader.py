@@ -180,6 +180,29 @@ def open_scenes(path: Path) -> list[PublicScene]:
     return [PublicScene(files) for files in find_scenes(path)]
 
 
+@dataclass(frozen=True)
+class PublicView:
+    """One view of a public scene, to be sampled from: read from its shard when first needed."""
+
+    scene: PublicScene
+    view: int
+    mix: int = 0
+
+    @property
+    def room(self) -> str:
+        """The scene's id: a scene is one room."""
+        return self.scene.scene_id
+
+    def load(self) -> RenderedView:
+        """Read it."""
+        return self.scene.read_view(self.view, self.mix)
+
+
+def public_views(path: Path) -> list[PublicView]:
+    """All views of the scenes at `path`, at full power; nothing is unpacked."""
+    return [PublicView(scene, view) for scene in open_scenes(path) for view in scene.views]
+
+
 def _active(meta: dict[str, Any]) -> int:
     """Index of the light that an OLAT pass turns on."""
     active = [i for i, light in enumerate(meta["lighting"]) if light.get("update")]

@@ -5,17 +5,36 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 from luxcore.data.compact import RenderedView, load_rendered, read_metadata
 from luxcore.data.crops import ViewSource
 from luxcore.errors import InputError
 
 
+@runtime_checkable
+class StoredView(Protocol):
+    """A view that lies somewhere else than in the compact form, such as in a public shard."""
+
+    @property
+    def room(self) -> str:
+        """Id of the room that it shows, without reading its pixels."""
+        ...
+
+    def load(self) -> RenderedView:
+        """Read it."""
+        ...
+
+
+AnyView = Path | RenderedView | StoredView
+"""A file stem of the compact form, a view already read, or one that can be read."""
+
+
 class ViewStore:
     """Sources of photos by number. What is kept changes speed, never results."""
 
-    def __init__(self, views: Sequence[Path | RenderedView], kept: int = 16) -> None:
-        """`views`: file stems of the compact form, or views already read."""
+    def __init__(self, views: Sequence[AnyView], kept: int = 16) -> None:
+        """Raises InputError when there are no views."""
         if not views:
             raise InputError("there are no rendered views to sample from.")
         self._views = list(views)
@@ -30,8 +49,7 @@ class ViewStore:
         if number in self._sources:
             self._sources.move_to_end(number)
             return self._sources[number]
-        view = self._views[number]
-        source = ViewSource(view if isinstance(view, RenderedView) else load_rendered(view))
+        source = ViewSource(_loaded(self._views[number]))
         self._sources[number] = source
         while len(self._sources) > self._kept:
             self._sources.popitem(last=False)
@@ -40,6 +58,10 @@ class ViewStore:
     def room(self, number: int) -> str:
         """Id of the room that a view shows, without reading its pixels."""
         view = self._views[number]
-        if isinstance(view, RenderedView):
-            return view.room
-        return str(read_metadata(view).get("room"))
+        return str(read_metadata(view).get("room")) if isinstance(view, Path) else view.room
+
+
+def _loaded(view: AnyView) -> RenderedView:
+    if isinstance(view, Path):
+        return load_rendered(view)
+    return view if isinstance(view, RenderedView) else view.load()

@@ -7,17 +7,16 @@ the same bits (paper, supplement, On-the-fly sampling).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy.random import PCG64, Generator, SeedSequence
 
-from luxcore.data.compact import MASK_KINDS, RenderedView
+from luxcore.data.compact import MASK_KINDS
 from luxcore.data.crops import LitCrop, ViewSource, with_lamps
 from luxcore.data.lighting import draw_relighting, exposed
 from luxcore.data.panorama import directions_of_pixels, sample_padded, view_rotation
-from luxcore.data.store import ViewStore
+from luxcore.data.store import AnyView, ViewStore
 
 FOV_DEG = (50.0, 90.0)
 ELEVATION_DEG = (-25.0, 30.0)
@@ -39,7 +38,7 @@ class SingleViewSamples:
 
     def __init__(
         self,
-        views: Sequence[Path | RenderedView],
+        views: Sequence[AnyView],
         size: tuple[int, int],
         seed: int,
         *,

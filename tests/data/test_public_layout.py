@@ -19,9 +19,10 @@ from luxcore.cameras import camera_from_nerfstudio, look_at
 from luxcore.data.compact import as_taken, load_rendered, save_rendered
 from luxcore.data.convert import compact_to_public, export_photos, public_to_compact
 from luxcore.data.crops import ViewSource
+from luxcore.data.multiview import MultiViewSets
 from luxcore.data.panorama import view_rotation
 from luxcore.data.public_names import mask_colours, paint_masks, pick_mask
-from luxcore.data.public_reader import open_scenes
+from luxcore.data.public_reader import open_scenes, public_views
 from luxcore.data.public_writer import write_scene, write_shards
 from luxcore.data.rotations import matrix_from_quaternion, quaternion_from_matrix
 from luxcore.data.training import SingleViewSamples
@@ -171,7 +172,19 @@ def test_shards_of_ten_are_read_without_unpacking(scene_root, tmp_path):
     assert packed.lamps == loose.lamps
     again = write_shards(folders, tmp_path / "again", "training")
     assert [a.read_bytes() for a in again] == [s.read_bytes() for s in shards]
-    assert SingleViewSamples([packed], (16, 16), seed=0)[0]["on"].size >= 0
+
+
+def test_training_reads_from_shards(tmp_path):
+    views = [panorama(height=16), panorama((4.0, 3.0, 1.4), height=16)]
+    folder = write_scene(tmp_path / "scenes", "000004", views)
+    write_shards([folder], tmp_path / "shards", "test")
+    packed, loose = public_views(tmp_path / "shards"), public_views(tmp_path / "scenes")
+    assert [(v.room, v.view) for v in packed] == [("000004", 1), ("000004", 2)]
+    photo = SingleViewSamples(packed, (16, 16), seed=0)[3]
+    again = SingleViewSamples(loose, (16, 16), seed=0)[3]
+    assert all(np.array_equal(photo[name], again[name]) for name in photo)
+    stacked = MultiViewSets(packed, (16, 16), seed=0, views_per_set=4)[0]
+    assert stacked["input_linear"].shape == (4, 16, 16, 3)
 
 
 def test_compact_and_public_convert_both_ways(tmp_path):
