@@ -91,7 +91,18 @@ class CaptureFiles:
         return _layers(self.folder("fuse") / f"{view:04d}.exr")
 
     def truth(self, view: int) -> dict[str, np.ndarray] | None:
-        return _layers(self.folder("capture") / "truth" / f"{view:04d}.exr")
+        """The true light of every lamp as it shone in the photo, in the order of the masks."""
+        folder = self.folder("capture") / "truth"
+        layers, about = _layers(folder / f"{view:04d}.exr"), read_json(folder / "lights.json")
+        if layers is None or about is None:
+            return None
+        found = {"ambient": layers["ambient"]}
+        for lamp in self.lamps:
+            index = lamp.get("truth_light", lamp["index"])
+            if index is not None:
+                scale = np.asarray(about["lamps"][index]["scale"], np.float32)
+                found[f"light_{lamp['index']:02d}"] = layers[f"light_{index:02d}"] * scale
+        return found
 
     def decomposed(self, view: int) -> dict[str, np.ndarray] | None:
         """Ambient and lamps of the single-view model, in the layout of `fused`."""

@@ -30,6 +30,8 @@ def lights(view: int) -> dict[str, np.ndarray]:
 
 
 SCALE = [[1.0, 0.8, 0.6], [0.5, 0.6, 0.7]]
+TRUTH_ORDER = {0: 1, 1: 0}
+"""Lamp of the masks → lamp of the room."""
 
 
 def photo(view: int) -> np.ndarray:
@@ -50,7 +52,14 @@ def artifacts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     skipped = [{"name": "blurred.jpg", "reason": "no matches"}]
     write_json(capture / "capture.json", {**about, "views": VIEWS, "skipped": skipped})
     lamps = [
-        {"index": i, "name": name, "on": True, "references": [0, 4], "areas": {"0": 9}}
+        {
+            "index": i,
+            "name": name,
+            "on": True,
+            "references": [0, 4],
+            "areas": {"0": 9},
+            "truth_light": TRUTH_ORDER[i],
+        }
         for i, name in enumerate(["desk <b>lamp</b>", "ceiling"])
     ]
     write_json(root / "masks" / "demo" / "lamps.json", lamps)
@@ -84,7 +93,13 @@ def _write_view(root: Path, view: int) -> None:
     capture, fuse = root / "capture" / "demo", root / "fuse" / "demo"
     layers = lights(view)
     write_png(capture / "images" / f"{view:04d}.png", photo(view))
-    write_exr(capture / "truth" / f"{view:04d}.exr", layers)
+    truth = {"ambient": layers["ambient"]}
+    # The truth is stored at unit white, in the room's own order of lamps.
+    for i, j in TRUTH_ORDER.items():
+        truth[f"light_{j:02d}"] = layers[f"light_{i:02d}"] / np.float32(SCALE[i])
+    write_exr(capture / "truth" / f"{view:04d}.exr", truth)
+    lamps = [{"scale": SCALE[i]} for j in range(LAMPS) for i in TRUTH_ORDER if TRUTH_ORDER[i] == j]
+    write_json(capture / "truth" / "lights.json", {"lamps": lamps})
     mask = np.zeros((H, W), bool)
     mask[5:9, 10 + view : 16 + view] = True
     write_png(root / "masks" / "demo" / f"{view:04d}_00.png", mask)

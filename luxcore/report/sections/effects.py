@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -9,30 +10,37 @@ from luxcore.report.content import Section, Table
 from luxcore.report.gallery import Gallery
 from luxcore.report.sections.dataset import rendered_views
 
-ROOMS_SHOWN = 12
+ROOMS_NAMED = 8
+"""Rooms that a row names; of more, the count is given."""
+
+Decision = tuple[str, str, str, str]
 
 
 def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section | None:
-    """A table per distinct set of decisions, with the rooms that share it."""
-    rooms: dict[str, dict[str, Any]] = {}
+    """One row per decision and reason, with the rooms that share it."""
+    rooms: dict[Decision, set[str]] = defaultdict(set)
     for view in rendered_views(artifacts):
-        rooms.setdefault(
-            str(view.metadata.get("room", view.name)), view.metadata.get("effects", {})
-        )
-    rooms = {room: effects for room, effects in rooms.items() if effects}
+        for name, effect in view.metadata.get("effects", {}).items():
+            rooms[_decision(name, effect)].add(str(view.metadata["room"]))
     if not rooms:
         return None
-    tables = tuple(_table(room, rooms[room]) for room in sorted(rooms)[:ROOMS_SHOWN])
+    rows = tuple((*decision, _named(rooms[decision])) for decision in sorted(rooms))
+    columns = ("effect", "", "bounces or count", "why", "rooms")
     intro = (
         "Each room is analysed before it is rendered; an effect that it does not call for costs "
-        f"nothing. {min(len(rooms), ROOMS_SHOWN)} of {len(rooms)} rooms are listed."
+        "nothing."
     )
-    return Section("Only the effects a room calls for", "effects", intro, tables)
+    table = Table("What was switched on", "render", columns, rows)
+    return Section("Only the effects a room calls for", "effects", intro, (table,))
 
 
-def _table(room: str, effects: dict[str, dict[str, Any]]) -> Table:
-    rows = tuple(
-        (name, "on" if e.get("on") else "off", str(e.get("amount") or ""), str(e.get("reason", "")))
-        for name, e in sorted(effects.items())
-    )
-    return Table(f"Room {room}", "render", ("effect", "", "bounces or count", "why"), rows)
+def _decision(name: str, effect: dict[str, Any]) -> Decision:
+    on = bool(effect.get("on"))
+    amount = str(effect.get("amount") or "") if on else ""
+    return name.replace("_", " "), "on" if on else "off", amount, str(effect.get("reason", ""))
+
+
+def _named(rooms: set[str]) -> str:
+    if len(rooms) > ROOMS_NAMED:
+        return f"{len(rooms)} rooms"
+    return ", ".join(sorted(rooms))

@@ -8,9 +8,10 @@ import numpy as np
 
 from luxcore.capture import load_capture
 from luxcore.errors import InputError
-from luxcore.files.exr import read_exr
+from luxcore.evaluate.captures import true_view
 from luxcore.light.agx import agx
 from luxcore.light.hdr import merge_brackets
+from luxcore.masks.store import load_masks
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
 
 BRACKETS_EV = {
@@ -32,13 +33,11 @@ def _prepare(bench: Bench) -> list[_Light]:
     capture = load_capture(bench.input("capture"))
     if capture.truth is None:
         raise InputError(f"{capture.root} has no known truth to compare exposures with.")
+    masks = load_masks(bench.input("masks"))
     lights = []
-    for path in sorted(capture.truth.glob("[0-9][0-9][0-9][0-9].exr"))[:VIEWS]:
-        layers = read_exr(path)
-        for name in (n for n in layers if n.startswith("light_")):
-            peak = float(np.quantile(layers[name], 0.5))
-            # At unit white and 1 W a lamp is dark: exposed as in a photo of it alone.
-            lights.append(_Light(layers[name], 0.18 / max(peak, 1e-9)))
+    for view in range(min(VIEWS, len(capture.frames))):
+        truth = true_view(capture, masks, view, capture.frames[view].camera.width)
+        lights += [_Light(np.asarray(light, np.float32), truth.exposure) for light in truth.lights]
     return lights
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from luxcore.capture import load_capture
+from luxcore.capture import Capture, load_capture
 from luxcore.decompose.stage import decompose_capture
 from luxcore.errors import InputError
+from luxcore.evaluate.captures import true_view
 from luxcore.files.exr import read_exr
 from luxcore.harmonize.stage import harmonize_capture
 from luxcore.light.agx import agx
+from luxcore.masks.store import LampMasks, load_masks
 from luxcore.metrics.image import psnr
 from luxcore.metrics.rescale import channel_scale
 from luxcore.models.small.backend import LONG_SIDE_PX
@@ -23,26 +25,47 @@ from luxcore.units import UnitStore
 ERROR = "RMS error of single lamps after rescale, display 0..1"
 
 
-def _error(views: Iterable[tuple[Path, dict[str, np.ndarray]]], exposure: float) -> float:
-    """Mean over views and lamps, against the true light of each."""
-    errors = []
-    for truth_path, layers in views:
-        truth = read_exr(truth_path)
-        for name in sorted(set(layers) & set(truth) - {"ambient"}):
-            scaled = layers[name] * channel_scale(layers[name], truth[name]).astype(np.float32)
-            shown, exact = (agx(np.float32(exposure) * i) for i in (scaled, truth[name]))
-            errors.append(10.0 ** (-psnr(shown, exact) / 20.0))
-    return float(np.mean(errors))
+@dataclass(frozen=True)
+class Truth:
+    """The true light of the lamps, at the power of the photos, in the order of the masks."""
+
+    capture: Capture
+    masks: LampMasks
+
+    @staticmethod
+    def of(bench: Bench) -> Truth:
+        """Raises InputError for a capture without known light."""
+        capture = load_capture(bench.input("capture"))
+        if capture.truth is None:
+            raise InputError(f"{capture.root} has no known truth to compare models with.")
+        return Truth(capture, load_masks(bench.input("masks")))
+
+    def error(self, views: Iterable[tuple[int, dict[str, np.ndarray]]]) -> float:
+        """Mean over views and lamps, after the rescale that the paper allows."""
+        return float(np.mean([e for view, layers in views for e in self._errors(view, layers)]))
+
+    def _errors(self, view: int, layers: dict[str, np.ndarray]) -> Iterator[float]:
+        truth = true_view(self.capture, self.masks, view, max(layers["light_00"].shape))
+        for index, light in enumerate(truth.lights):
+            exact = np.asarray(light, np.float32)
+            found = layers[f"light_{index:02d}"]
+            scaled = found * channel_scale(found, exact).astype(np.float32)
+            shown, target = (agx(np.float32(truth.exposure) * i) for i in (scaled, exact))
+            yield 10.0 ** (-psnr(shown, target) / 20.0)
 
 
-def _truth(bench: Bench) -> Path:
-    truth = load_capture(bench.input("capture")).truth
-    if truth is None:
-        raise InputError(f"{bench.input('capture')} has no known truth to compare models with.")
-    return truth
+@dataclass(frozen=True)
+class _Prepared:
+    bench: Bench
+    truth: Truth
 
 
-def _decompose(bench: Bench, choice: Choice, repeat: int) -> Work:
+def _prepare(bench: Bench) -> _Prepared:
+    return _Prepared(bench, Truth.of(bench))
+
+
+def _decompose(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
+    bench = prepared.bench
     settings = bench.params.decompose.model_copy(
         update={"options": {"long_side_px": int(choice.label.split()[0])}}
     )
@@ -53,19 +76,18 @@ def _decompose(bench: Bench, choice: Choice, repeat: int) -> Work:
             bench.input("capture"), bench.input("masks"), bench.input("splat"), out, settings,
             weights=_weights(bench, "train_sv"),
         )  # fmt: skip
-    truth = _truth(bench)
-    exposure = load_capture(bench.input("capture")).exposure or 1.0
     views = (
         (
-            truth / f"{folder.name}.exr",
+            int(folder.name),
             {f.stem: next(iter(read_exr(f).values())) for f in folder.glob("light_*.exr")},
         )
         for folder in sorted(out.glob("[0-9][0-9][0-9][0-9]"))
     )
-    return watch.work(_error(views, exposure))
+    return watch.work(prepared.truth.error(views))
 
 
-def _harmonize(bench: Bench, choice: Choice, repeat: int) -> Work:
+def _harmonize(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
+    bench = prepared.bench
     settings = bench.params.harmonize.model_copy(
         update={"views_per_pass": choice.settings["harmonize.views_per_pass"]}
     )
@@ -80,21 +102,14 @@ def _harmonize(bench: Bench, choice: Choice, repeat: int) -> Work:
             bench.input("decompose"), out, settings, UnitStore(store),
             weights=_weights(bench, "train_mv"),
         )  # fmt: skip
-    truth = _truth(bench)
-    exposure = load_capture(bench.input("capture")).exposure or 1.0
     files = sorted((out / "direct").glob("*.exr"))
-    return watch.work(_error(((truth / f.name, read_exr(f)) for f in files), exposure))
+    return watch.work(prepared.truth.error((int(f.stem), read_exr(f)) for f in files))
 
 
 def _weights(bench: Bench, stage: str) -> Path | None:
     """The weights that the run trained, else those that are shipped."""
     path = bench.artifacts / stage / "model.safetensors"
     return path if path.is_file() else None
-
-
-def _prepare(bench: Bench) -> Bench:
-    _truth(bench)
-    return bench
 
 
 PHOTO_SIZE = Knob(
