@@ -27,7 +27,8 @@ Screen to_screen(const Footprint *f, const F opacity_logit, const float4 intrins
   s.radius = fmax(rx, ry);
   s.x = fma(intrinsics.x, f->t.x / f->t.z, (F)intrinsics.z);
   s.y = fma(intrinsics.y, f->t.y / f->t.z, (F)intrinsics.w);
-  s.drawn = f->valid && above >= 0.0f && rx + ry + fabs(s.x) + fabs(s.y) < 1e9f &&
+  // exp_f clamps a NaN away, so the logit is asked itself.
+  s.drawn = f->valid && opacity_logit == opacity_logit && above >= 0.0f && rx + ry + fabs(s.x) + fabs(s.y) < 1e9f &&
             s.x + rx > 0.0f && s.x - rx < (float)size.x && s.y + ry > 0.0f &&
             s.y - ry < (float)size.y;
   const F k = (0.5f * LOG2_E) / f->det;

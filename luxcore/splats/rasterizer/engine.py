@@ -50,8 +50,9 @@ class Rasterizer:
         records, radii = device.empty((n, 8)), device.empty((n,), np.int32)
         depth_keys, tile_counts = device.empty((n,), np.uint32), device.empty((n,), np.int32)
         device.launch(
-            self._projection.project_gaussians, -(-n // self._lanes), n, *_camera_arguments(camera), means, quats,
-            log_scales, opacity_logits, records, depth_keys, tile_counts, radii, group=GROUP,
+            self._projection.project_gaussians, -(-n // self._lanes), n,
+            *_camera_arguments(camera), means, quats, log_scales, opacity_logits, records,
+            depth_keys, tile_counts, radii, group=GROUP,
         )  # fmt: skip
         lists = self._binning(camera, records, depth_keys, tile_counts)
         image, alpha, depth, used = self._blending.forward(camera, lists, records, colors)
