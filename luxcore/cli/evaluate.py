@@ -54,6 +54,8 @@ import click
     type=click.Path(path_type=Path),
     help="camera_params_48.json of the public dataset, with --public-cases.",
 )
+@click.option("--backend", default="small", show_default=True, help="Single-view model.")
+@click.option("--mv-backend", default="small", show_default=True, help="Multi-view model.")
 @click.option("--sv-weights", default=None, type=click.Path(path_type=Path))
 @click.option("--mv-weights", default=None, type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
@@ -66,6 +68,8 @@ def command(
     size: int,
     public_cases: Path | None,
     public_cameras: Path | None,
+    backend: str,
+    mv_backend: str,
     sv_weights: Path | None,
     mv_weights: Path | None,
     seed: int,
@@ -78,7 +82,9 @@ def command(
     from luxcore.evaluate.run import evaluate_models
     from luxcore.settings.evaluate import EvaluateSettings
 
-    settings = EvaluateSettings(cases=cases, groups=groups, size_px=size)
+    settings = EvaluateSettings(
+        cases=cases, groups=groups, size_px=size, backend=backend, mv_backend=mv_backend
+    )
     weights = {"sv_weights": sv_weights, "mv_weights": mv_weights}
     if (public_cases is None) != (public_cameras is None):
         raise InputError("--public-cases and --public-cameras go together.")

@@ -250,7 +250,7 @@ def test_absent_weights_are_one_sentence(name: str) -> None:
     opener = open_decomposer if name == "flux-kontext" else open_harmonizer
     with pytest.raises(InputError, match=f"{name} ships no weights"):
         opener(name, BackendSettings())
-    with pytest.raises(InputError, match="is no folder of trained"):
+    with pytest.raises(InputError, match="nowhere is no local folder"):
         opener(name, BackendSettings(sv_weights="nowhere", mv_weights="nowhere"))
     with pytest.raises(InputError, match="unknown key stpes"):
         opener(name, BackendSettings(options={"stpes": 3}))

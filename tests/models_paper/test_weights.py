@@ -115,7 +115,7 @@ def test_models_ship_no_weights() -> None:
         exported_folder(None, "flux-kontext")
     with pytest.raises(InputError, match="pickled"):
         exported_folder("weights.ckpt", "flux-kontext")
-    with pytest.raises(InputError, match="is no folder of trained"):
+    with pytest.raises(InputError, match="nowhere is no local folder"):
         exported_folder("nowhere", "flux-kontext")
 
 

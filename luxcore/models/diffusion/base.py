@@ -31,7 +31,8 @@ def base_folder(base: str, components: Sequence[str]) -> Path:
         raise InputError("this model needs a base: set base to a local folder or to a hub id.")
     folder = Path(base).expanduser()
     if not folder.is_dir():
-        folder = _from_hub(base, components)
+        files = (*TEXT_FILES, "*.safetensors")
+        folder = hub_folder(base, [f"{name}/{file}" for name in components for file in files])
     for name in components:
         if not (folder / name).is_dir():
             raise InputError(f"{base} has no folder {name}: it is not a base of this model.")
@@ -75,21 +76,23 @@ def refuse_pickled_folder(folder: Path) -> None:
             raise InputError(f"{file} is a pickled file, which may run code; give safetensors.")
 
 
-def _from_hub(base: str, components: Sequence[str]) -> Path:
+def hub_folder(repository: str, patterns: Sequence[str]) -> Path:
+    """The local copy of a hub repository's files of these patterns, fetched unless it is there.
+
+    Raises InputError in one sentence when the id is none, or cannot be had.
+    """
     from huggingface_hub import snapshot_download
     from huggingface_hub.errors import HfHubHTTPError, HFValidationError, LocalEntryNotFoundError
 
-    patterns = ["model_index.json"]
-    for name in components:
-        patterns += [f"{name}/{pattern}" for pattern in (*TEXT_FILES, "*.safetensors")]
     try:
-        return Path(snapshot_download(base, allow_patterns=patterns))
+        return Path(snapshot_download(repository, allow_patterns=list(patterns)))
     except HFValidationError as error:
-        raise InputError(f"{base} is neither a folder nor a hub id.") from error
+        raise InputError(f"{repository} is neither a folder nor a hub id.") from error
     except LocalEntryNotFoundError as error:
         raise InputError(
-            f"{base} is no local folder, is not in the hub cache, and the hub cannot be reached."
+            f"{repository} is no local folder, is not in the hub cache, and the hub cannot be "
+            "reached."
         ) from error
     except (HfHubHTTPError, OSError) as error:
         reason = " ".join(str(error).split())[:200]
-        raise InputError(f"{base} cannot be fetched from the hub: {reason}.") from error
+        raise InputError(f"{repository} cannot be fetched from the hub: {reason}.") from error

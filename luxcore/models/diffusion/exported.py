@@ -11,6 +11,7 @@ from torch import Tensor
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
+from luxcore.models.diffusion.base import hub_folder
 from luxcore.models.diffusion.options import parse_options
 from luxcore.models.diffusion.weights import (
     assign,
@@ -37,16 +38,14 @@ def write_exported(folder: Path, model: str, settings: Settings, files: Files) -
 
 
 def exported_folder(weights: str | None, model: str) -> Path:
-    """The folder that a user names. Raises InputError when none is given or it is no folder."""
+    """The folder, or the hub id, that a user names. Raises InputError when it cannot be had."""
     if not weights:
         raise InputError(
-            f"{model} ships no weights: train it, and name the folder of the trained weights."
+            f"{model} ships no weights: train it, and name the folder (or hub id) of the result."
         )
     folder = Path(weights).expanduser()
     refuse_pickled(folder)
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder of trained {model} weights.")
-    return folder
+    return folder if folder.is_dir() else hub_folder(weights, ("*.json", "*.safetensors"))
 
 
 def read_card(folder: Path, model: str, kind: type[Section]) -> Section:

@@ -10,16 +10,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
-from torch.optim import Optimizer
+from torch import nn
 from torch.utils.data import DataLoader
 
 from luxcore.errors import DivergedError
@@ -32,51 +31,13 @@ from luxcore.models.diffusion.checkpoint import (
 )
 from luxcore.models.diffusion.events import Listener
 from luxcore.models.diffusion.schedule import ExampleKey, Plan
+from luxcore.models.diffusion.trainee import Example, Trainee
 from luxcore.models.diffusion.weights import trainable
 from luxcore.progress import progress
 from luxcore.settings.paper_models import LoopSettings, TrainingPhase
 
 if TYPE_CHECKING:
     from accelerate import Accelerator
-
-Example = Mapping[str, Tensor]
-"""One training example as CPU tensors, by name."""
-
-
-@runtime_checkable
-class Examples(Protocol):
-    """Training examples by key: the same key, the same bits, in any process."""
-
-    def __getitem__(self, key: ExampleKey) -> Example: ...
-
-
-@runtime_checkable
-class Trainee(Protocol):
-    """A model that the loop can train."""
-
-    @property
-    def module(self) -> nn.Module:
-        """Its forward takes the tensors of `batch` by name and returns a loss per example, [b]."""
-        ...
-
-    @property
-    def examples(self) -> Examples: ...
-
-    def optimizer(self, parameters: Sequence[nn.Parameter]) -> Optimizer: ...
-
-    def batch(
-        self, keys: Sequence[ExampleKey], examples: Sequence[Example], device: torch.device
-    ) -> dict[str, Tensor]:
-        """Encoded examples and their noise, on `device`; all randomness follows from `keys`."""
-        ...
-
-    def pictures(self) -> Mapping[str, np.ndarray]:
-        """Validation pictures [h, w, 3] in 0..1, with the parameters as they are."""
-        ...
-
-    def export(self, folder: Path) -> None:
-        """Write the parameters as they are into an existing folder, ready to be loaded."""
-        ...
 
 
 @dataclass

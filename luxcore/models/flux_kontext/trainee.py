@@ -13,9 +13,9 @@ from torch.optim import AdamW, Optimizer
 
 from luxcore.models.diffusion.frames import to_picture
 from luxcore.models.diffusion.latents import encode
-from luxcore.models.diffusion.loop import Example
 from luxcore.models.diffusion.randomness import torch_generator
 from luxcore.models.diffusion.schedule import ExampleKey
+from luxcore.models.diffusion.trainee import Example
 from luxcore.models.flux_kontext.editor import Editor
 from luxcore.models.flux_kontext.embeddings import PromptEmbeddings
 from luxcore.models.flux_kontext.examples import EditExamples, prompts_of

@@ -14,9 +14,9 @@ from torch.optim import AdamW, Optimizer
 
 from luxcore.models.diffusion.frames import to_picture
 from luxcore.models.diffusion.latents import decode, encode
-from luxcore.models.diffusion.loop import Example
 from luxcore.models.diffusion.randomness import torch_generator
 from luxcore.models.diffusion.schedule import ExampleKey
+from luxcore.models.diffusion.trainee import Example
 from luxcore.models.multiview_unet.condition import Condition, latent_mask
 from luxcore.models.multiview_unet.examples import ViewExamples
 from luxcore.models.multiview_unet.sampling import sample
