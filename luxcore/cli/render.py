@@ -45,7 +45,10 @@ def command(
     from luxcore.settings.rooms import RoomsSettings
     from luxcore.units import executor_from_environment
 
-    settings = RenderSettings(height=_height(size), spp=spp, views_per_room=views)
+    # A room that fails is named and left out; the others are worth keeping.
+    settings = RenderSettings(
+        height=_height(size), spp=spp, views_per_room=views, max_failed_ratio=1.0
+    )
     done = render_public(
         range(seed, seed + rooms),
         out,

@@ -11,12 +11,15 @@ import bpy
 from luxcore.render.blender.materials import matt_material
 
 LAMP_PROPERTY = "lux_lamp"
-"""Custom property of an object that gives light: the index of its lamp, -1 for the outside."""
+"""Custom property of an object that gives light: the index of its lamp, or OUTSIDE."""
+
+OUTSIDE = -1
+"""In place of a lamp's index: the environment and its portals."""
 
 
 @contextmanager
 def only_lamp(scene: Any, lamp: int) -> Iterator[None]:
-    """Inside, only this lamp gives light; what else emits still stands there and casts shadows."""
+    """Inside, only this lamp (or OUTSIDE) gives light; the others still cast their shadows."""
     swapped, hidden = [], []
     matt = matt_material("unlit")
     for holder in scene.objects:
@@ -29,7 +32,9 @@ def only_lamp(scene: Any, lamp: int) -> Iterator[None]:
             swapped.append((holder.data, holder.data.materials[0]))
             holder.data.materials[0] = matt
     background = scene.world.node_tree.nodes["Background"].inputs["Strength"]
-    daylight, background.default_value = background.default_value, 0.0
+    daylight = background.default_value
+    if lamp != OUTSIDE:
+        background.default_value = 0.0
     try:
         yield
     finally:

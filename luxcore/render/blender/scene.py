@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from luxcore.cameras import OPENGL_FROM_OPENCV, Camera
-from luxcore.render.blender.lights import LAMP_PROPERTY
+from luxcore.render.blender.lights import LAMP_PROPERTY, OUTSIDE
 from luxcore.render.blender.materials import build_material, emitter_material
 from luxcore.render.effects import Effects
 from luxcore.render.hdri import hdri_path, mean_luminance
@@ -20,10 +20,6 @@ from luxcore.rooms.model import Environment, Opening, Part, Room, Spot
 AMBIENT_GROUP = "ambient"
 FIXTURE_INDEX, EMITTER_INDEX = 2, 3
 """Object index of lamp i: 10·(i+1) + one of these; everything else has index 0."""
-
-
-OUTSIDE = -1
-"""In place of a lamp's index: a portal of the environment."""
 
 
 def lamp_group(index: int) -> str:
