@@ -35,7 +35,9 @@ def lampness(blob: Blob, elevation_deg: float) -> float:
         + 0.45 * min(cues.contrast_stops, 6)
         + 0.8 * np.clip(cues.glow_stops, -0.5, 2)
         + 0.35 * np.clip(cues.surround_stops, -3, 2.5)
-        + 6 * np.clip(cues.warmth, -0.15, 0.2)
+        # A lamp that clips to white looks cooler than the room it lights: that is held against it
+        # only as far as it helps against skylights.
+        + 6 * np.clip(cues.warmth, -0.05, 0.2)
     )
     # Bright things on floors and low tables are mostly lit, not lamps.
     low = 2.5 * np.clip((-10 - elevation_deg) / 30, 0, 1)

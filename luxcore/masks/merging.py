@@ -14,7 +14,7 @@ REACH = 1.25
 
 Above 1, since what hides the middle of a lamp hides part of its extent too."""
 
-THIN = 0.6
+THIN = 0.4
 """Width over length up to which a region is a strip."""
 
 ALIGNED = 0.97
