@@ -36,7 +36,7 @@ class SplatSettings(Settings):
     )
     antialiased: bool = Field(False, description="low-pass compensation of Mip-Splatting")
     rate_scale: float = Field(
-        1.0, gt=0, le=100, description="multiplies all learning rates of 3DGS; short runs want > 1"
+        3.0, gt=0, le=100, description="multiplies all learning rates of 3DGS; long runs want 1"
     )
     holdout_every: int = Field(
         8, ge=2, le=1000, description="one view in this many is not trained on but measured"

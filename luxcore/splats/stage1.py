@@ -40,6 +40,8 @@ _VERSION = 1
 _DENSITY_START, _DENSITY_STOP = 0.08, 0.65
 """Shares of a run between which Gaussians are added and removed; the rest only settles them."""
 _DENSITY_STEPS = 12
+_GROWN_AT = 0.7
+"""Share of the refinements after which MCMC has reached the cap."""
 _HARMONICS_AT = 0.7
 
 Log = Callable[[str], None]
@@ -103,7 +105,7 @@ def _prepare(
     gaussians = initial_gaussians(xyz, rgb, extent, limit, random)
     gaussians = replace(gaussians, antialiased=settings.antialiased)
     rates = Rates.for_scene(extent, settings.rate_scale)
-    strategy = _strategy(device, extent, rates, settings, seed)
+    strategy = _strategy(device, extent, rates, settings, seed, len(gaussians))
     fit = GeometryFit(
         device, views, split, gaussians, strategy, rates,
         iterations=settings.iterations, ssim_weight=settings.ssim_weight, seed=seed,
@@ -114,13 +116,14 @@ def _prepare(
 
 
 def _strategy(
-    device: Device, extent: float, rates: Rates, settings: SplatSettings, seed: int
+    device: Device, extent: float, rates: Rates, settings: SplatSettings, seed: int, count: int
 ) -> Strategy:
     start, stop = (int(settings.iterations * share) for share in (_DENSITY_START, _DENSITY_STOP))
     every = max(1, (stop - start) // _DENSITY_STEPS)
     cap = settings.max_gaussians
     if settings.density == "mcmc":
-        chain = McmcSettings(start, stop, every, cap)
+        growth = max((cap / max(count, 1)) ** (1 / (_GROWN_AT * _DENSITY_STEPS)), 1.05)
+        chain = McmcSettings(start, stop, every, cap, growth=min(growth, 2.0))
         return McmcStrategy(device, extent, rates.means, seed, chain)
     return StandardStrategy(device, extent, StandardSettings(start, stop, every, cap))
 
