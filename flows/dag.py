@@ -7,6 +7,14 @@ from graphlib import TopologicalSorter
 
 from tasks.context import artifact_folder, metrics_file
 
+SMALL_MODEL = (
+    "luxcore/models/interface.py",
+    "luxcore/models/backends.py",
+    "luxcore/models/small",
+    "luxcore/models/weights",
+)
+"""The default backend. The paper's own backends are no part of what the embedded run depends on."""
+
 COMMON_CODE = ("luxcore/files", "luxcore/units", "luxcore/cameras.py", "tasks/context.py")
 """Code that every stage runs; a change of it makes every stage stale."""
 
@@ -49,19 +57,19 @@ STAGES: tuple[Stage, ...] = (
         "render",
         "every lamp of every room by one light-group render a view",
         needs=("rooms",),
-        code=("luxcore/render", "luxcore/rooms"),
+        code=("luxcore/render", "luxcore/rooms", "luxcore/data", "luxcore/light"),
     ),
     Stage(
         "train_sv",
         "fine-tune the single-view decomposition model",
         needs=("render",),
-        code=("luxcore/models", "luxcore/data", "luxcore/light"),
+        code=(*SMALL_MODEL, "luxcore/data", "luxcore/light"),
     ),
     Stage(
         "train_mv",
         "fine-tune the multi-view harmonization model",
         needs=("render",),
-        code=("luxcore/models", "luxcore/data", "luxcore/light"),
+        code=(*SMALL_MODEL, "luxcore/data", "luxcore/light"),
     ),
     Stage(
         "capture",
@@ -85,19 +93,19 @@ STAGES: tuple[Stage, ...] = (
         "decompose",
         "reference views into ambient and one image per lamp",
         needs=("capture", "masks", "splat", "train_sv"),
-        code=("luxcore/decompose", "luxcore/models", "luxcore/light"),
+        code=("luxcore/decompose", *SMALL_MODEL, "luxcore/light"),
     ),
     Stage(
         "harmonize",
         "the decomposition carried to every view, in chained passes of at most 15",
         needs=("capture", "masks", "splat", "decompose", "train_mv"),
-        code=("luxcore/harmonize", "luxcore/models", "luxcore/light"),
+        code=("luxcore/harmonize", *SMALL_MODEL, "luxcore/light"),
     ),
     Stage(
         "fuse",
         "three exposures per lamp and view merged to linear HDR",
         needs=("capture", "harmonize"),
-        code=("luxcore/light",),
+        code=("luxcore/light", "luxcore/capture"),
     ),
     Stage(
         "relight",
@@ -109,7 +117,7 @@ STAGES: tuple[Stage, ...] = (
         "evaluate",
         "the tables: decomposition, harmonization and relighting against truth",
         needs=("render", "capture", "masks", "train_sv", "train_mv", "fuse", "relight"),
-        code=("luxcore/evaluate", "luxcore/metrics", "luxcore/models", "luxcore/splats", "kernels"),
+        code=("luxcore/evaluate", "luxcore/metrics", *SMALL_MODEL, "luxcore/splats", "kernels"),
         settings=("splat",),
     ),
     Stage(
