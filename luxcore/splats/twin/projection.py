@@ -89,7 +89,7 @@ def jacobian(camera: Camera, t: Float[Tensor, "n 3"]) -> Float[Tensor, "n 2 3"]:
     return torch.stack([row0, row1], 1)
 
 
-def _pair(a: float, b: float, like: Tensor) -> Tensor:
+def _pair(a: float | int, b: float | int, like: Tensor) -> Tensor:
     return torch.tensor([a, b], dtype=like.dtype)
 
 
