@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -21,9 +22,9 @@ def check_inside(scene: Path, link: str, root: Path) -> None:
 
 
 def check_text_links(path: Path, root: Path) -> None:
-    """Judge what can be judged before another program opens the file: glTF, OBJ, MTL, USDA."""
+    """Judge what can be judged before another program opens the file: glTF, OBJ, USDA."""
     kind = path.suffix.lower()
-    if kind not in {".gltf", ".obj", ".mtl", ".usda"} or path.stat().st_size > _MAX_TEXT:
+    if kind not in {".gltf", ".glb", ".obj", ".mtl", ".usda"} or path.stat().st_size > _MAX_TEXT:
         return
     for link in _links(path, kind):
         check_inside(path, link, root)
@@ -32,7 +33,7 @@ def check_text_links(path: Path, root: Path) -> None:
 
 
 def _links(path: Path, kind: str) -> list[str]:
-    if kind == ".gltf":
+    if kind in {".gltf", ".glb"}:
         return _gltf_links(path)
     text = path.read_text(encoding="utf-8", errors="replace")
     if kind == ".usda":
@@ -45,12 +46,23 @@ def _links(path: Path, kind: str) -> list[str]:
     return [w[-1] for w in named if len(w) > 1]
 
 
+def _gltf_json(path: Path) -> bytes:
+    """The JSON of a .gltf, or of the first chunk of a .glb (12 bytes of header, length, type)."""
+    if path.suffix.lower() == ".gltf":
+        return path.read_bytes()
+    with open(path, "rb") as stream:
+        magic, _, _, length, kind = struct.unpack("<4sIII4s", stream.read(20))
+        if magic != b"glTF" or kind != b"JSON":
+            raise ValueError("its header is another one")
+        return stream.read(length)
+
+
 def _gltf_links(path: Path) -> list[str]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(_gltf_json(path))
         entries = [*content.get("buffers", []), *content.get("images", [])]
         uris = [str(e["uri"]) for e in entries if "uri" in e]
-    except (ValueError, AttributeError, TypeError, RecursionError) as error:
+    except (ValueError, AttributeError, TypeError, RecursionError, struct.error) as error:
         raise FormatError(f"{path} is not readable glTF: {error}.") from error
     remote = next((u for u in uris if "://" in u), None)
     if remote:

@@ -52,19 +52,17 @@ def spread_points(outline: Sequence[Vec2], count: int, away: Sequence[Vec2] = ()
     ]
     inside = [p for p in grid if is_inside(outline, *p)]
     room_for = {p: _wall_distance(outline, p) for p in inside}
+    middle = (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
     chosen: list[Vec2] = []
-    for _ in range(count):
-        best = max(
-            inside,
-            # Half the gap to a neighbour is as good as the whole gap to a wall.
-            key=lambda p: min(
-                [room_for[p], *(0.5 * math.dist(p, o) for o in (*chosen, *away))], default=0
-            ),
-            default=None,
-        )
-        if best is None:
-            break
-        chosen.append((round(best[0], 4), round(best[1], 4)))
+
+    def freedom(point: Vec2) -> tuple[float, float]:
+        """Half the gap to a neighbour is as good as the whole gap to a wall; ties to the middle."""
+        gaps = [0.5 * math.dist(point, other) for other in (*chosen, *away)]
+        return round(min([room_for[point], *gaps]), 2), -math.dist(point, middle)
+
+    for _ in range(count if inside else 0):
+        x, y = max(inside, key=freedom)
+        chosen.append((round(x, 4), round(y, 4)))
     return chosen
 
 
