@@ -13,7 +13,7 @@ from luxcore.data.compact import list_rendered, read_metadata
 from luxcore.errors import LuxError
 from luxcore.files.atomic import write_json
 from luxcore.render.paths import walk
-from luxcore.render.unit import RENDER_CODE, view_job
+from luxcore.render.unit import NOT_IN_THE_PIXELS, RENDER_CODE, view_job
 from luxcore.render.views import PanoramaView
 from luxcore.rooms.batch import read_room, read_rooms
 from luxcore.rooms.model import Room
@@ -132,7 +132,7 @@ def dataset_statistics(out: Path) -> dict[str, float]:
 
 
 def _job(room: Room, arguments: dict[str, Any], stem: str, size: tuple[int, int]) -> Job:
-    keyed = {k: v for k, v in arguments.items() if k != "timeout_s"}
+    keyed = {k: v for k, v in arguments.items() if k not in NOT_IN_THE_PIXELS}
     key = unit_key(RENDER_CODE, keyed)
     unit = Unit(stem, "luxcore.render.unit:render_unit", arguments, key)
     return Job(unit, stem, size[0] * size[1], len(room.lamps) + 1)

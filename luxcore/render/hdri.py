@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from luxcore.errors import InputError
+from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr_image
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -35,11 +35,26 @@ def hdri_path(name: str) -> Path:
 
 @cache
 def mean_luminance(path: Path) -> float:
-    """The mean radiance of an equirectangular HDRI over the sphere, as luminance."""
-    luminance = read_exr_image(path) @ LUMINANCE
+    """The mean radiance of an equirectangular HDRI over the sphere, as luminance.
+
+    Raises FormatError for a file that is no picture and InputError for a black one.
+    """
+    luminance = _read_hdri(path) @ LUMINANCE
     height = luminance.shape[0]
     weight = np.cos(np.pi * (0.5 - (np.arange(height) + 0.5) / height))
     mean = float((luminance.mean(axis=1) * weight).sum() / weight.sum())
     if not mean > 0:
         raise InputError(f"{path} is black: an environment must give light.")
     return mean
+
+
+def _read_hdri(path: Path) -> np.ndarray:
+    """[h, w, 3] linear radiance of an .exr or a Radiance .hdr."""
+    if path.suffix != ".hdr":
+        return read_exr_image(path)
+    import cv2
+
+    pixels = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise FormatError(f"{path} is not a readable Radiance picture.")
+    return pixels[..., ::-1].astype(np.float32)

@@ -10,6 +10,9 @@ from luxcore.render.views import View, view_to_json
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
 
+NOT_IN_THE_PIXELS = ("timeout_s", "memory_mb")
+"""Arguments of a unit that do not belong to its key."""
+
 RENDER_CODE = ("luxcore/render", "luxcore/rooms/model.py", "luxcore/rooms/shapes.py")
 """What a rendered view depends on beside its arguments (for the key of its unit)."""
 
@@ -28,6 +31,7 @@ def view_job(
         "top_up_noise": settings.top_up_noise,
         "top_up_factor": settings.top_up_factor,
         "timeout_s": settings.timeout_s,
+        "memory_mb": settings.memory_mb,
     }
 
 

@@ -30,6 +30,9 @@ class RenderSettings(Settings):
     demo_fov_deg: float = Field(72.0, gt=20, lt=120, description="horizontal field of view")
     demo_spp: int = Field(12, ge=1, le=4096, description="samples per pixel of a demo view")
     timeout_s: float = Field(900.0, gt=0, description="a view that takes longer is quarantined")
+    memory_mb: int = Field(
+        8000, ge=1000, description="address space of the renderer; a view that needs more fails"
+    )
     max_failed_ratio: float = Field(
         0.1, ge=0, le=1, description="share of views that may fail before the stage does"
     )

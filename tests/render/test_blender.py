@@ -206,6 +206,14 @@ def test_a_room_that_cannot_be_built_is_named(
         render(broken, panorama, "broken")
 
 
+def test_a_room_that_needs_too_much_memory_fails_and_the_next_one_renders(
+    room: Room, panorama: PanoramaView, render: Renders
+) -> None:
+    with pytest.raises(LuxError, match="Blender gave no image"):
+        render(room, PanoramaView(room.viewpoints[0], 1024, 512), "large", memory_mb=1)
+    assert load_rendered(render(room, panorama, "next")).lights.any()
+
+
 def _loaded(stem: Path) -> RenderedView:
     return load_rendered(stem)
 

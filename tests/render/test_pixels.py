@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from luxcore.cameras import look_at
-from luxcore.errors import InputError, LuxError
+from luxcore.errors import FormatError, InputError, LuxError
+from luxcore.files.exr import write_exr
 from luxcore.render.compact import KEY_LUMINANCE, photo_exposure
 from luxcore.render.hdri import blender_hdri_folder, hdri_path, mean_luminance
 from luxcore.render.noise import joined, relative_noise
 from luxcore.render.oidn import Denoiser, keep_energy
 from luxcore.render.process import BlenderProcess
 from luxcore.render.views import PanoramaView, view_from_json, view_to_json
+from luxcore.rooms.generate import environment_names
+from luxcore.settings.rooms import RoomsSettings
 
 
 def test_energy_is_kept_outside_of_emitters() -> None:
@@ -105,6 +110,23 @@ def test_environments_of_blender() -> None:
     assert mean_luminance(hdri_path("courtyard")) > 0
     with pytest.raises(InputError, match="no such environment"):
         hdri_path("/nowhere/sky.exr")
+
+
+def test_environments_of_a_user(tmp_path: Path) -> None:
+    """Radiance and OpenEXR pictures; the mean is over the sphere, where poles weigh little."""
+    sky = np.full((32, 64, 3), 1.0, np.float32)
+    sky[:4] = 9.0
+    write_exr(tmp_path / "sky.exr", {"image": sky}, half=False)
+    cv2.imwrite(str(tmp_path / "sky.hdr"), sky)
+    names = environment_names(RoomsSettings(hdri_folder=str(tmp_path)))
+    assert [Path(n).name for n in names] == ["sky.exr", "sky.hdr"]
+    # The share of the sphere above 67.5 degrees of elevation is (1 - sin 67.5°) / 2.
+    expected = 1 + 8 * (1 - np.sin(np.radians(67.5))) / 2
+    for name in names:
+        assert mean_luminance(hdri_path(name)) == pytest.approx(expected, rel=0.01)
+    (tmp_path / "broken.hdr").write_bytes(b"#?RADIANCE nothing")
+    with pytest.raises(FormatError, match=r"broken\.hdr"):
+        mean_luminance(tmp_path / "broken.hdr")
 
 
 @pytest.fixture

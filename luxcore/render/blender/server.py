@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import sys
 import traceback
 from pathlib import Path
@@ -31,9 +32,16 @@ def main() -> None:
 
 def _answer(job: Any, request: dict[str, Any]) -> dict[str, Any]:
     try:
+        _cap_memory(request["memory_mb"])
         return {"ok": job.render(request, Path(request["out_dir"]))}
     except Exception as error:
         return {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
+
+
+def _cap_memory(memory_mb: int) -> None:
+    """Allocations beyond this fail, so that one room cannot take the machine down."""
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (memory_mb << 20, hard))
 
 
 if __name__ == "__main__":
