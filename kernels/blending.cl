@@ -65,10 +65,10 @@ DEFINE_BLENDING(float16, int16, block)
   }                                                                                               \
   /* left and right ends of the widest chord with top <= y <= bottom; false where there is none */ \
   inline F chord_##NAME(const Ellipse_##NAME e, const F top, const F bottom, F *left, F *right) { \
-    const F low = fmax(top - e.y, -e.y_max), high = fmin(bottom - e.y, e.y_max);                  \
-    const F yr = fmin(fmax(-e.y_side, low), high), yl = fmin(fmax(e.y_side, low), high);          \
-    const F half_r = sqrt(fmax(fma(-e.det * yr, yr, e.ta), (F)0.0f));                             \
-    const F half_l = sqrt(fmax(fma(-e.det * yl, yl, e.ta), (F)0.0f));                             \
+    const F low = max(top - e.y, -e.y_max), high = min(bottom - e.y, e.y_max);                  \
+    const F yr = min(max(-e.y_side, low), high), yl = min(max(e.y_side, low), high);          \
+    const F half_r = sqrt(max(fma(-e.det * yr, yr, e.ta), (F)0.0f));                             \
+    const F half_l = sqrt(max(fma(-e.det * yl, yl, e.ta), (F)0.0f));                             \
     *right = fma(half_r - e.b * yr, e.inverse_a, e.x) + CHORD_SLACK;                              \
     *left = fma(-half_l - e.b * yl, e.inverse_a, e.x) - CHORD_SLACK;                              \
     return high - low + CHORD_SLACK; /* negative: no chord */                                     \

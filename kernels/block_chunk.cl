@@ -41,10 +41,11 @@ int16 reached_blocks(const float8 *record, const float x0, const float y0) {
     float16 left, right;
     const float16 found = chord_block(e, (float16)(row * 4 + 0.5f), (float16)(row * 4 + 3.5f),
                                       &left, &right);
-    // Block k of the row has its pixel centres at 4 k + 0.5 .. 4 k + 3.5.
-    const float16 first = fmin(fmax(ceil((left - 3.5f) * 0.25f), 0.0f), 4.0f);
-    const float16 last = fmin(fmax(floor((right - 0.5f) * 0.25f), -1.0f), 3.0f);
-    const int16 bits = ((int16)(2) << convert_int16(last)) - ((int16)(1) << convert_int16(first));
+    // Block k of the row has its pixel centres at 4 k + 0.5 .. 4 k + 3.5. Rounding up and down is
+    // done by truncation, which never loses a block.
+    const int16 first = convert_int16(min(max(left - 3.5f, 0.0f) * 0.25f + 0.998f, 4.0f));
+    const int16 end = convert_int16(min(max(right + 3.5f, 0.0f) * 0.25f, 4.0f));
+    const int16 bits = ((int16)(1) << end) - ((int16)(1) << first);
     blocks |= found >= 0.0f ? bits << (4 * row) : (int16)(0);
   }
   return blocks;

@@ -25,8 +25,9 @@ TileRows tile_rows(const float8 r, const int2 size) {
   rows.columns = (size.x + TILE - 1) / TILE;
   // Row k has its pixel centres at TILE k + 0.5 .. TILE k + TILE - 0.5.
   const float reach = e.y_max + CHORD_SLACK;
-  rows.first = (int)ceil(fmax(e.y - reach - (TILE - 0.5f), 0.0f) * (1.0f / TILE));
-  rows.end = (int)floor(fmin((e.y + reach - 0.5f) * (1.0f / TILE), (size.y - 1) / TILE)) + 1;
+  rows.first = (int)(max(e.y - reach - (TILE - 0.5f), 0.0f) * (1.0f / TILE) + 0.999f);
+  const float last = min((e.y + reach - 0.5f) * (1.0f / TILE), (float)((size.y - 1) / TILE));
+  rows.end = last >= 0.0f ? (int)last + 1 : 0;
   return rows;
 }
 
@@ -35,11 +36,14 @@ inline void tile_spans(const TileRows *rows, const int row, int8 *begin, int8 *e
   float8 left, right;
   const float8 y = ((float)row + ROW_LANES) * TILE;
   const float8 found = chord_rows(rows->ellipse, y + 0.5f, y + (TILE - 0.5f), &left, &right);
-  const float8 first = ceil(fmax(left - (TILE - 0.5f), 0.0f) * (1.0f / TILE));
-  const float8 last = floor(fmin((right - 0.5f) * (1.0f / TILE), (float8)(rows->columns - 1.0f)));
-  const int8 some = found >= 0.0f && first <= last && row + ROW_LANES < (float)rows->end;
-  *begin = some ? convert_int8(first) : (int8)(0);
-  *end = some ? convert_int8(last) + 1 : (int8)(0);
+  // Rounding up and down by truncation, which never loses a tile.
+  const int8 first = convert_int8(max(left - (TILE - 0.5f), 0.0f) * (1.0f / TILE) + 0.999f);
+  const int8 last =
+      convert_int8(min((right - 0.5f) * (1.0f / TILE), (float8)(rows->columns - 1.0f)));
+  const int8 some = found >= 0.0f && right >= 0.5f && first <= last &&
+                    row + ROW_LANES < (float)rows->end;
+  *begin = some ? first : (int8)(0);
+  *end = some ? last + 1 : (int8)(0);
 }
 
 int count_tiles(const float8 record, const int2 size) {
