@@ -121,7 +121,7 @@ class _Drawn:
     truth: np.ndarray
 
 
-RENDERS = 5
+RENDERS = 20
 """Pictures of one timing: one alone takes milliseconds."""
 
 
