@@ -24,8 +24,8 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
         return None
     intro = (
         "Photos as they came, the pixels that were taken for lamps, and the light of each lamp "
-        "alone. Light is linear inside and shown through AgX at the capture's exposure; lamps are "
-        "at unit white, “put together” is ambient + Σ scale · lamp and should look like the photo."
+        "alone. Light is linear inside and shown through AgX at the capture's exposure; “put "
+        "together” is ambient + Σ scale · lamp and should look like the photo."
     )
     return Section("From photos to lamps", "captures", intro, tuple(blocks))
 

@@ -1,0 +1,79 @@
+"""Take the pictures of docs/images from a finished run: `python docs/screenshots.py`.
+
+Needs Debian's Chromium and, for the dashboards, `lux dashboards` running.
+"""
+
+from __future__ import annotations
+
+import argparse
+import urllib.parse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from playwright.sync_api import sync_playwright
+
+from luxcore.viewer.app import Viewer
+from luxcore.viewer.open import open_scene
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
+EVENING = "split=40&l1=0,0,o"
+"""The first lamp off, the photo on the left."""
+
+
+def shoot(browser: Browser, address: str, out: Path, size: tuple[int, int], wait_ms: int) -> None:
+    """One page as a picture."""
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    page.goto(address)
+    page.wait_for_timeout(wait_ms)
+    page.screenshot(path=str(out))
+    page.close()
+    print(out)
+
+
+def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:
+    """The viewer at rest, with its exact picture."""
+    viewer = Viewer(open_scene(scene), "127.0.0.1", port, out)
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(f"http://127.0.0.1:{port}")
+    page.get_by_text("Exact picture").wait_for(timeout=120_000)
+    page.wait_for_timeout(2000)
+    page.locator("button[class*=close], [aria-label=Close]").first.click(timeout=2000, force=True)
+    page.wait_for_timeout(500)
+    page.screenshot(path=str(out / "viewer.png"))
+    page.get_by_role("checkbox").nth(2).uncheck()
+    page.get_by_text("Fast preview").wait_for()
+    page.get_by_text("Exact picture").wait_for(timeout=120_000)
+    page.wait_for_timeout(2000)
+    page.screenshot(path=str(out / "viewer_lamp_off.png"))
+    viewer.close()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--reports", type=Path, default=Path("reports"))
+    parser.add_argument("--scene", type=Path, default=Path("artifacts/relight/demo"))
+    parser.add_argument("--out", type=Path, default=Path("docs/images"))
+    parser.add_argument("--mlflow", help="address of mlflow's page, if it runs")
+    parser.add_argument("--prefect", help="address of Prefect's page, if it runs")
+    given = parser.parse_args()
+    reports, out = given.reports.resolve().as_uri(), given.out
+    blend = f"{reports}/blend-demo.html#{urllib.parse.quote(EVENING, safe='=&,')}"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        shoot(browser, f"{reports}/index.html", out / "report.png", (1200, 1000), 1500)
+        shoot(browser, blend, out / "explorer.png", (1400, 860), 3000)
+        shoot(browser, blend, out / "explorer_phone.png", (390, 844), 3000)
+        for name in ("mlflow", "prefect"):
+            if address := getattr(given, name):
+                shoot(browser, address, out / f"{name}.png", (1400, 860), 8000)
+        if given.scene.is_dir():
+            shoot_viewer(browser, given.scene, out, 8133)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
