@@ -41,6 +41,7 @@ def command(
 ) -> None:
     """What accuracy costs in time: one Pareto curve per knob.
 
+    Knobs measured before on the same capture and machine are kept in OUT/tradeoff.json.
     With --budget or --quality nothing is measured: settings are chosen from the last sweep, and
     what they are expected to take is printed.
     """
@@ -58,9 +59,9 @@ def _measure(
     from luxcore.settings.load import load_settings
     from luxcore.settings.project import ProjectSettings
     from luxcore.tradeoff.knob import Bench
-    from luxcore.tradeoff.knobs import KNOBS
+    from luxcore.tradeoff.knobs import KNOBS, ORDER
     from luxcore.tradeoff.page import write_tradeoffs
-    from luxcore.tradeoff.sweep import measure
+    from luxcore.tradeoff.sweep import measure, merged
 
     chosen = [knob for knob in KNOBS if not names or any(name in knob.name for name in names)]
     if not chosen:
@@ -74,8 +75,10 @@ def _measure(
             folder.mkdir()
             sweeps.append(measure(knob, Bench(artifacts, folder, params, capture), repeats))
             _tell(sweeps[-1])
-    page = write_tradeoffs(out, sweeps, _about(capture, repeats))
-    click.echo(f"{page}")
+            about = _about(capture)
+            # After every knob: a sweep that is interrupted keeps what it has measured.
+            write_tradeoffs(out, merged(out / "tradeoff.json", sweeps, about, ORDER), about)
+    click.echo(f"{out / 'tradeoff.html'}")
 
 
 def _tell(sweep: Sweep) -> None:
@@ -111,9 +114,9 @@ def _advise(path: Path, budget: str | None, quality: str | None) -> None:
         click.echo(f"  {name}: {'null' if value is None else value}")
 
 
-def _about(capture: str, repeats: int) -> dict[str, object]:
+def _about(capture: str) -> dict[str, str]:
     import os
     import platform
 
     machine = f"{os.cpu_count()} cores ({platform.machine()})"
-    return {"scene": f"capture {capture}", "repeats": repeats, "machine": machine}
+    return {"scene": f"capture {capture}", "machine": machine}

@@ -112,6 +112,18 @@ def load_sweeps(path: Path) -> tuple[list[Sweep], dict[str, Any]]:
         raise FormatError(f"{path} does not hold sweeps: {error!r}.") from error
 
 
+def merged(
+    path: Path, fresh: Sequence[Sweep], about: dict[str, Any], order: Sequence[str]
+) -> list[Sweep]:
+    """`fresh` and those sweeps of `path` that were measured on the same thing, in `order`."""
+    kept: list[Sweep] = []
+    if path.is_file():
+        old, old_about = load_sweeps(path)
+        kept = old if old_about == about else []
+    latest = {sweep.knob: sweep for sweep in (*kept, *fresh)}
+    return [latest[name] for name in order if name in latest]
+
+
 def _sweep(record: dict[str, Any]) -> Sweep:
     points = tuple(
         Point(p["label"], p["settings"], tuple(Work(**work) for work in p["works"]))

@@ -21,10 +21,11 @@ from luxcore.tradeoff.sweep import (
     front,
     load_sweeps,
     measure,
+    merged,
     save_sweeps,
 )
 
-ABOUT = {"scene": "capture demo", "repeats": 3, "machine": "2 cores"}
+ABOUT = {"scene": "capture demo", "machine": "2 cores"}
 
 
 def point(label: str, seconds: float, error: float, spread: float = 0.0) -> Point:
@@ -68,7 +69,10 @@ def test_measurements_take_turns() -> None:
         assert prepared == "ready"
         return Work(1.0, 1.0, 0.5)
 
-    choices = (Choice("x", {"splat.iterations": 1200}), Choice("y", {"splat.iterations": 5}))
+    choices = (
+        Choice("x", {"splat.iterations": ProjectSettings().splat.iterations}),
+        Choice("y", {"splat.iterations": 5}),
+    )
     knob = Knob("k", choices, "error", "why", lambda bench: "ready", run)
     bench = Bench(Path("none"), Path("none"), ProjectSettings(), "demo")
     measured = measure(knob, bench, 2, quiet=True)
@@ -129,6 +133,17 @@ def test_measurements_come_back_from_disk_and_the_page_marks_the_default(tmp_pat
     assert "broken &lt;knob&gt;" in page
     assert "beaten in time and in error by good" in page
     assert (tmp_path / "tradeoff-01.svg").stat().st_size > 1000
+
+
+def test_knobs_measured_before_are_kept_unless_measured_on_something_else(tmp_path: Path) -> None:
+    path = tmp_path / "t.json"
+    other = sweep("p", point("p", 1.0, 0.2), name="samples")
+    assert merged(path, [KNEE], ABOUT, ["samples", "iterations"]) == [KNEE]
+    save_sweeps(path, [KNEE, other], ABOUT)
+    again = sweep("p", point("p", 2.0, 0.1), name="samples")
+    assert merged(path, [again], ABOUT, ["samples", "iterations"]) == [again, KNEE]
+    elsewhere = {**ABOUT, "scene": "capture attic"}
+    assert merged(path, [again], elsewhere, ["samples", "iterations"]) == [again]
 
 
 def test_a_sweep_of_another_version_is_one_sentence(tmp_path: Path) -> None:

@@ -17,3 +17,6 @@ KNOBS: tuple[Knob, ...] = (
     models.PHOTO_SIZE,
     models.VIEWS_PER_PASS,
 )
+
+ORDER = tuple(knob.name for knob in KNOBS)
+"""Names in the order of the page."""
