@@ -21,6 +21,8 @@ _PROPERTIES = (
     "uchar blue",
 )
 _MAX_HEADER = 4096
+_TEXT_BYTES = 12
+"""Six numbers of one digit, each with a separator: the shortest line that holds a point."""
 
 
 class Points(NamedTuple):
@@ -42,7 +44,7 @@ def write_points(path: Path, points: Points) -> None:
 
 
 def read_points(path: Path) -> Points:
-    """The inverse of `write_points`.
+    """The inverse of `write_points`; the same properties as text are read too (nerfstudio's own).
 
     Raises InputError when the file is missing, FormatError when its header is another one, when
     it claims more points than it has bytes for (checked before allocating), or holds NaN.
@@ -55,24 +57,45 @@ def read_points(path: Path) -> Points:
         end = header.find(b"end_header\n")
         if not header.startswith(b"ply\n") or end < 0:
             raise FormatError(f"{path} is not a PLY file.")
-        count = _vertex_count(path, header[:end].decode("ascii", "replace").splitlines())
+        lines = header[:end].decode("ascii", "replace").splitlines()
+        text = "format ascii 1.0" in lines
+        count = _vertex_count(path, lines)
         offset = end + len(b"end_header\n")
-        room = (path.stat().st_size - offset) // _VERTEX.itemsize
+        room = (path.stat().st_size - offset) // (_TEXT_BYTES if text else _VERTEX.itemsize)
         if count > room:
             raise FormatError(f"{path} claims {count} points, its bytes hold {room}.")
         stream.seek(offset)
-        vertices = np.frombuffer(stream.read(count * _VERTEX.itemsize), _VERTEX)
-    if not np.isfinite(vertices["xyz"]).all():
+        if text:
+            points = _text_points(path, stream.read(), count)
+        else:
+            vertices = np.frombuffer(stream.read(count * _VERTEX.itemsize), _VERTEX)
+            points = Points(vertices["xyz"].astype(np.float32), vertices["rgb"].copy())
+    if not np.isfinite(points.xyz).all():
         raise FormatError(f"{path} has points that are not finite.")
-    return Points(vertices["xyz"].astype(np.float32), vertices["rgb"].copy())
+    return points
+
+
+def _text_points(path: Path, raw: bytes, count: int) -> Points:
+    try:
+        values = np.array(raw.split()[: 6 * count], float).reshape(count, 6)
+    except ValueError as error:
+        raise FormatError(f"{path} is not {count} lines of six numbers: {error}.") from error
+    if count and not ((values[:, 3:] >= 0) & (values[:, 3:] <= 255)).all():
+        raise FormatError(f"{path} has colours outside 0..255.")
+    return Points(values[:, :3].astype(np.float32), values[:, 3:].astype(np.uint8))
 
 
 def _vertex_count(path: Path, lines: list[str]) -> int:
     wanted = [f"property {p}" for p in _PROPERTIES]
-    properties = [line for line in lines if line.startswith("property")]
+    properties = [
+        line.replace("uint8", "uchar").replace("float32", "float")
+        for line in lines
+        if line.startswith("property")
+    ]
     counts = [line.split()[-1] for line in lines if line.startswith("element vertex ")]
-    if "format binary_little_endian 1.0" not in lines or properties != wanted:
-        raise FormatError(f"{path} must be binary little-endian with {', '.join(_PROPERTIES)}.")
+    known = {"format binary_little_endian 1.0", "format ascii 1.0"} & set(lines)
+    if len(known) != 1 or properties != wanted:
+        raise FormatError(f"{path} must be little-endian or text with {', '.join(_PROPERTIES)}.")
     if len(counts) != 1 or not counts[0].isdigit():
         raise FormatError(f"{path} does not say how many points it holds.")
     return int(counts[0])

@@ -40,7 +40,7 @@ def test_no_points(tmp_path: Path) -> None:
         (b"vertex 11", b"vertex 12", "claims 12 points"),
         (b"vertex 11", b"vertex -1", "how many points"),
         (b"little_endian", b"big_endian", "little-endian"),
-        (b"float x", b"list uchar int x", "must be binary"),
+        (b"float x", b"list uchar int x", "must be little-endian"),
         (b"end_header", b"end-header", "not a PLY"),
     ],
 )
@@ -48,6 +48,25 @@ def test_hostile_headers(ply: Path, old: bytes, new: bytes, fact: str) -> None:
     ply.write_bytes(ply.read_bytes().replace(old, new))
     with pytest.raises(FormatError, match=fact):
         read_points(ply)
+
+
+def test_nerfstudios_text_points(tmp_path: Path) -> None:
+    properties = "".join(f"property float {c}\n" for c in "xyz")
+    properties += "".join(f"property uint8 {c}\n" for c in ("red", "green", "blue"))
+    header = f"ply\nformat ascii 1.0\nelement vertex 2\n{properties}end_header\n"
+    path = tmp_path / "sparse_pc.ply"
+    path.write_text(header + "1.5 -2 3e-1 255 0 7\n0 0 1 1 2 3\n")
+    points = read_points(path)
+    assert points.xyz == pytest.approx(np.array([[1.5, -2, 0.3], [0, 0, 1]]))
+    assert points.rgb.tolist() == [[255, 0, 7], [1, 2, 3]]
+    for body, fact in (
+        ("1 2 3 4 5 6\n", "its bytes hold 1"),
+        ("1 2 3 4 5 6\n1 2 3 x 5 66\n", "six numbers"),
+        ("1 2 3 4 5 6\n1 2 3 4 5 666\n", "outside 0..255"),
+    ):
+        path.write_text(header + body)
+        with pytest.raises(FormatError, match=fact):
+            read_points(path)
 
 
 def test_nan_is_refused(ply: Path) -> None:
