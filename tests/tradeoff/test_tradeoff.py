@@ -13,6 +13,7 @@ from luxcore.errors import FormatError, InputError
 from luxcore.settings.project import ProjectSettings
 from luxcore.tradeoff.advise import parse_budget, with_quality, within_budget
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
+from luxcore.tradeoff.knobs import KNOBS
 from luxcore.tradeoff.page import write_tradeoffs
 from luxcore.tradeoff.sweep import (
     Point,
@@ -79,6 +80,11 @@ def test_measurements_take_turns() -> None:
     assert order == ["x0", "y0", "x1", "y1"]
     assert measured.default == "x"
     assert [len(p.works) for p in measured.points] == [2, 2]
+
+
+def test_every_knob_measures_its_own_default() -> None:
+    for knob in KNOBS:
+        assert knob.default(ProjectSettings()) in {c.label for c in knob.choices}, knob.name
 
 
 def test_the_stopwatch_counts_work_and_not_waiting() -> None:

@@ -23,7 +23,7 @@ from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
 
 MAX_SIDE = 160
 """Photos are shrunk to this: many short runs say more than one long one."""
-SHORT = 400
+SHORT = 300
 """Iterations of the runs whose subject is not iterations."""
 
 
@@ -71,7 +71,7 @@ ERROR = "RMS error of held-out views, display 0..1"
 
 ITERATIONS = Knob(
     name="iterations of stage 1",
-    choices=tuple(Choice(str(n), {"splat.iterations": n}) for n in (150, 300, 600, 1200, 2400)),
+    choices=tuple(Choice(str(n), {"splat.iterations": n}) for n in (100, 200, 400, 800, 1600)),
     error=ERROR,
     why="Held-out error falls slowly after the default, while time goes on growing in proportion.",
     prepare=_prepare_fit(),
