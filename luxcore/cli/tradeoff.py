@@ -25,7 +25,9 @@ QUALITIES = ("low", "default", "high")
     help="Artifacts of a finished run to measure on.",
 )
 @click.option("--capture", default="demo", show_default=True, help="The capture to measure on.")
-@click.option("--out", default=Path("artifacts/tradeoff"), show_default=True, type=click.Path(path_type=Path))
+@click.option(
+    "--out", default=Path("artifacts/tradeoff"), show_default=True, type=click.Path(path_type=Path)
+)
 @click.option("--knob", "names", multiple=True, help="Only knobs whose name contains this.")
 @click.option("--repeats", default=3, show_default=True, type=click.IntRange(1, 100))
 @click.option("--budget", help="Choose settings for a time such as 2min from OUT/tradeoff.json.")
