@@ -7,9 +7,18 @@
 // partials, in the order of the sorted lists: the moments of h (see projection_backward.cl), then
 // dL/d features. No atomics. touched[row] must be 0 before; rows of Gaussians that no open pixel
 // sees stay untouched.
-// Compile-time: CHANNELS, WITH_DEPTH, PARTIAL_SIZE, CHUNK and the constants of blending.cl.
+// With COLORS_ONLY, for frozen geometry, a row holds dL/d features alone; image, alpha, depth and
+// their gradients other than d_image are not read.
+// Compile-time: CHANNELS, COLORS_ONLY, WITH_DEPTH, PARTIAL_SIZE, CHUNK and the constants of blending.cl.
 #define FEATURES (CHANNELS + WITH_DEPTH)
+#ifndef COLORS_ONLY
+#define COLORS_ONLY 0
+#endif
+#if COLORS_ONLY
+#define MOMENTS 0
+#else
 #define MOMENTS 6
+#endif
 // Features are summed in equal groups of at most 12, which fit the registers; padding is zero.
 #define GROUPS ((FEATURES + 11) / 12)
 #define GROUP_SIZE ((FEATURES + GROUPS - 1) / GROUPS)
@@ -47,6 +56,7 @@ inline float16 blend_backward(Block *block, const float8 r, const float *feature
   const int16 drawn = after >= TRANSMITTANCE_MIN;
   const float16 weight = drawn ? alpha * T : (float16)(0.0f);
   block->T = drawn ? after : (float16)(0.0f);
+#if !COLORS_ONLY
   // Four sums, as one long chain of additions would wait for itself.
   float16 s[4] = {block->d_alpha, (float16)(0.0f), (float16)(0.0f), (float16)(0.0f)};
 #pragma unroll
@@ -64,6 +74,7 @@ inline float16 blend_backward(Block *block, const float8 r, const float *feature
   moments[3] = fma(hx, dx, moments[3]);
   moments[4] = fma(hx, dy, moments[4]);
   moments[5] = fma(hy, dy, moments[5]);
+#endif
   return weight;
 }
 
@@ -94,24 +105,27 @@ void read_block(Block *block, const int x0, const int y0, const int2 size,
     const int x = x0 + (lane & 3), y = y0 + (lane >> 2);
     const int inside = x < size.x && y < size.y;
     const size_t pixel = inside ? (size_t)y * size.x + x : 0;
+    T[lane] = inside ? 1.0f : 0.0f;
+    for (int k = 0; k < CHANNELS; ++k)
+      d_features[k][lane] = inside ? d_image[pixel * CHANNELS + k] : 0.0f;
+#if !COLORS_ONLY
     const float d_a = inside && d_alpha ? d_alpha[pixel] : 0.0f;
     float sum = d_a * alpha[pixel];
-    for (int k = 0; k < CHANNELS; ++k) {
-      const float d = inside ? d_image[pixel * CHANNELS + k] : 0.0f;
-      d_features[k][lane] = d;
-      sum = fma(d, image[pixel * CHANNELS + k], sum);
-    }
+    for (int k = 0; k < CHANNELS; ++k)
+      sum = fma(d_features[k][lane], image[pixel * CHANNELS + k], sum);
 #if WITH_DEPTH
     d_features[CHANNELS][lane] = inside ? d_depth[pixel] : 0.0f;
     sum = fma(d_features[CHANNELS][lane], depth[pixel], sum);
 #endif
     d_alphas[lane] = d_a;
     rest[lane] = sum;
-    T[lane] = inside ? 1.0f : 0.0f;
+#endif
   }
   block->T = vload16(0, T);
+#if !COLORS_ONLY
   block->rest = vload16(0, rest);
   block->d_alpha = vload16(0, d_alphas);
+#endif
   for (int k = 0; k < FEATURES; ++k) block->d_features[k] = vload16(0, d_features[k]);
   for (int k = FEATURES; k < PADDED; ++k) block->d_features[k] = (float16)(0.0f);
 }

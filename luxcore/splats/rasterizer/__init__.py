@@ -17,6 +17,9 @@ as the input arrays are not overwritten.
 `g` is a `RasterGradients`: means, quats, log_scales, opacity_logits, colors in the shapes of the
 inputs; mean2d_norm [n], the length of the gradient of the projected mean in units of half the image
 size (the number that 3DGS compares with 2e-4 to densify); visible [n] uint8, 1 where drawn.
+
+With frozen geometry, `r.recolor(out, colors)` draws other colours through the same sorted lists,
+and `r.color_gradients(out, d_image)` gives d_colors [n, channels] alone, at half the cost.
 """
 
 from luxcore.splats.rasterizer.config import RasterConfig

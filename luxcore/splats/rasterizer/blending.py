@@ -10,7 +10,7 @@ import numpy as np
 import pyopencl.array as cla
 
 from luxcore.cameras import Camera
-from luxcore.splats.device import Device, Kernels
+from luxcore.splats.device import Device
 from luxcore.splats.rasterizer.binning import TileLists, tile_grid
 from luxcore.splats.rasterizer.config import TILE, RasterConfig
 from luxcore.splats.rasterizer.output import RasterOutput
@@ -27,7 +27,7 @@ class Blending:
     def __init__(self, device: Device, config: RasterConfig) -> None:
         self.device, self.config = device, config
         self._group = GROUP[device.mapping]
-        self._forward = self._program("forward", with_depth=True)
+        self._forward = device.program(f"raster_{device.mapping}_forward", self._defines(True))
 
     def forward(
         self, camera: Camera, lists: TileLists, records: cla.Array, colors: cla.Array
@@ -56,28 +56,47 @@ class Blending:
         d_depth: cla.Array | None,
     ) -> tuple[cla.Array, cla.Array]:
         """(moments [n, 8] for kernels/projection_backward.cl, d_colors [n, C])."""
-        device, lists, with_depth = self.device, out.saved.lists, d_depth is not None
+        with_depth = d_depth is not None
+        defines = self._defines(with_depth)
+        moments = self.device.empty((out.inputs.count, 8))
+        upstream = (out.image, out.alpha, out.depth, d_image, d_alpha, d_depth)
+        return moments, self._partials(out, defines, upstream, moments)
+
+    def color_gradients(self, out: RasterOutput, d_image: cla.Array) -> cla.Array:
+        """d_colors [n, C] alone; the blending weights are all it needs."""
+        if self.device.mapping == "pixel":
+            return self.backward(out, d_image, None, None)[1]
+        defines = self._defines(False) | {
+            "COLORS_ONLY": 1,
+            "PARTIAL_SIZE": -(-self.config.channels // 4) * 4,
+        }
+        return self._partials(out, defines, (None, None, None, d_image, None, None), None)
+
+    def _partials(
+        self,
+        out: RasterOutput,
+        defines: dict[str, int | float | str],
+        upstream: tuple[cla.Array | None, ...],
+        moments: cla.Array | None,
+    ) -> cla.Array:
+        device, lists = self.device, out.saved.lists
         columns, tiles = tile_grid(out.camera)
         n, pairs = out.inputs.count, max(lists.pairs, 1)
-        partials = device.empty((pairs, self.config.partial_size(with_depth)))
+        partials = device.empty((pairs, int(defines["PARTIAL_SIZE"])))
         touched = device.zeros((pairs,), np.uint8)
+        kernels = device.program(f"raster_{device.mapping}_backward", defines)
         device.launch(
-            self._program("backward", with_depth).raster_backward, tiles * self._group,
-            _size(out.camera), columns, lists.ranges, lists.sorted_ids, out.saved.records,
-            out.inputs.colors, out.saved.used, out.image, out.alpha, out.depth, d_image, d_alpha,
-            d_depth, partials, touched, group=self._group,
+            kernels.raster_backward, tiles * self._group, _size(out.camera), columns, lists.ranges,
+            lists.sorted_ids, out.saved.records, out.inputs.colors, out.saved.used, *upstream,
+            partials, touched, group=self._group,
         )  # fmt: skip
-        moments, d_colors = device.empty((n, 8)), device.empty((n, self.config.channels))
-        gather = device.program("gather_partials", self._defines(with_depth)).gather_partials
+        d_colors = device.empty((n, self.config.channels))
+        gather = device.program("gather_partials", defines).gather_partials
         device.launch(
-            gather, n, n, lists.order, lists.offsets, lists.slot_positions, partials,
-            touched, moments, d_colors, group=64,
+            gather, n, n, lists.order, lists.offsets, lists.slot_positions, partials, touched,
+            moments, d_colors, group=64,
         )  # fmt: skip
-        return moments, d_colors
-
-    def _program(self, direction: str, with_depth: bool) -> Kernels:
-        name = f"raster_{self.device.mapping}_{direction}"
-        return self.device.program(name, self._defines(with_depth))
+        return d_colors
 
     def _defines(self, with_depth: bool) -> dict[str, int | float | str]:
         return self.config.defines() | {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pyopencl.array as cla
 
@@ -86,6 +88,21 @@ class Rasterizer:
             gradients.visible, group=GROUP,
         )  # fmt: skip
         return gradients
+
+    def recolor(self, out: RasterOutput, colors: cla.Array) -> RasterOutput:
+        """The same view with other colours [n, channels]: geometry and sorted lists are reused."""
+        inputs = replace(out.inputs, colors=colors)
+        self._check(inputs)
+        saved = out.saved
+        image, alpha, depth, used = self._blending.forward(
+            out.camera, saved.lists, saved.records, colors
+        )
+        saved = SavedForBackward(saved.records, saved.lists, used)
+        return RasterOutput(image, alpha, depth, out.radii, out.camera, inputs, saved)
+
+    def color_gradients(self, out: RasterOutput, d_image: cla.Array) -> cla.Array:
+        """Gradient by the colours [n, channels] alone: what frozen geometry needs."""
+        return self._blending.color_gradients(out, d_image)
 
     def _check(self, inputs: GaussianArrays) -> None:
         n = inputs.count
