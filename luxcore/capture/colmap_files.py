@@ -48,20 +48,27 @@ def read_model(folder: Path, image_root: Path) -> SparseModel:
     binary = (folder / "cameras.bin").is_file()
     suffix = ".bin" if binary else ".txt"
     cameras_path, images_path = folder / f"cameras{suffix}", folder / f"images{suffix}"
-    points_path = folder / f"points3D{suffix}"
     try:
         lenses = _cameras_bin(cameras_path) if binary else _cameras_txt(cameras_path)
         records = list(_images_bin(images_path) if binary else _images_txt(images_path))
-        points = Points(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))
-        if points_path.is_file():
-            points = _points_bin(points_path) if binary else _points_txt(points_path)
+        points = read_points3d(folder)
     except (struct.error, ValueError, IndexError, UnicodeDecodeError, OverflowError) as error:
         raise FormatError(f"{folder} is not a readable COLMAP model: {error}.") from error
     images = tuple(_posed(images_path, image_root, r, lenses) for r in sorted(records))
     check_spread(images_path, images)
-    if not np.isfinite(points.xyz).all():
-        raise FormatError(f"{points_path} has points that are not finite.")
     return SparseModel(images, points)
+
+
+def read_points3d(folder: Path) -> Points:
+    """The points of a model; none where it has no file of them."""
+    points = Points(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))
+    for name, read in (("points3D.bin", _points_bin), ("points3D.txt", _points_txt)):
+        if (folder / name).is_file():
+            points = read(folder / name)
+            break
+    if not np.isfinite(points.xyz).all():
+        raise FormatError(f"{folder} has points that are not finite.")
+    return points
 
 
 def _posed(path: Path, root: Path, record: Record, lenses: dict[int, Lens]) -> PosedImage:

@@ -18,8 +18,10 @@ from luxcore.capture.posed import PosedPhoto, to_views
 from luxcore.capture.sfm import solve_poses
 from luxcore.capture.sparse import SparseModel
 from luxcore.capture.store import Capture, Skipped, load_capture, write_capture
+from luxcore.capture.triangulate import triangulate
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder
+from luxcore.files.photos import write_png
 from luxcore.settings.capture import CaptureSettings
 
 
@@ -44,10 +46,11 @@ def ingest(
     if (source / "capture.json").is_file():
         return _copy(source, out)
     if (source / "transforms.json").is_file():
-        return _from_nerfstudio(source, out, identifier, settings)
+        photos, points = read_nerfstudio(source / "transforms.json")
+        return _write(photos, points, out, identifier, settings, seed, "nerfstudio", [])
     model = find_model(source)
     if model is not None:
-        return _from_colmap(source, model, out, identifier, settings)
+        return _from_colmap(source, model, out, identifier, settings, seed)
     return _from_photos(source, out, identifier, settings, seed)
 
 
@@ -67,21 +70,14 @@ def _copy(source: Path, out: Path) -> Capture:
     return load_capture(out)
 
 
-def _from_nerfstudio(
-    source: Path, out: Path, identifier: str, settings: CaptureSettings
-) -> Capture:
-    photos, points = read_nerfstudio(source / "transforms.json")
-    views = to_views(photos, settings.image_side)
-    return write_capture(out, identifier, views, points, source="nerfstudio", metric=False)
-
-
 def _from_colmap(
-    source: Path, model: Path, out: Path, identifier: str, settings: CaptureSettings
+    source: Path, model: Path, out: Path, identifier: str, settings: CaptureSettings, seed: int
 ) -> Capture:
     root = next(f for f in (source / "images", source) if f.is_dir())
     sparse = read_model(model, root)
     files = {image.name: inside(root, image.name, model) for image in sparse.images}
-    return _write(sparse, files, {}, out, identifier, settings, "colmap", [])
+    photos, points = _room_like(sparse, files, {})
+    return _write(photos, points, out, identifier, settings, seed, "colmap", [])
 
 
 def _from_photos(
@@ -99,7 +95,8 @@ def _from_photos(
         skipped += [Skipped(p.name, "could not be placed") for p in unplaced]
         files = {p.path.name: p.path for p in staged}
         names = {p.path.name: p.name for p in staged}
-        return _write(sparse, files, names, out, identifier, settings, "photos", skipped)
+        posed, points = _room_like(sparse, files, names)
+        return _write(posed, points, out, identifier, settings, seed, "photos", skipped)
 
 
 def _check_enough(
@@ -116,16 +113,9 @@ def _check_enough(
     )
 
 
-def _write(
-    sparse: SparseModel,
-    files: dict[str, Path],
-    names: dict[str, str],
-    out: Path,
-    identifier: str,
-    settings: CaptureSettings,
-    source: str,
-    skipped: list[Skipped],
-) -> Capture:
+def _room_like(
+    sparse: SparseModel, files: dict[str, Path], names: dict[str, str]
+) -> tuple[list[PosedPhoto], Points]:
     """COLMAP's world has neither up nor metres: turn it upright and scale it like a room."""
     c2w = np.stack([np.linalg.inv(image.w2c) for image in sparse.images])
     world = room_like(c2w, sparse.points.xyz.astype(float))
@@ -134,12 +124,41 @@ def _write(
         PosedPhoto(names.get(i.name, i.name), files[i.name], i.lens, world.pose(pose))
         for i, pose in zip(sparse.images, c2w, strict=True)
     ]
+    return photos, Points(xyz, sparse.points.rgb)
+
+
+def _write(
+    photos: list[PosedPhoto],
+    points: Points,
+    out: Path,
+    identifier: str,
+    settings: CaptureSettings,
+    seed: int,
+    source: str,
+    skipped: list[Skipped],
+) -> Capture:
+    if len(points.xyz) == 0:
+        points = _missing_points(photos, settings, seed)
     return write_capture(
         out,
         identifier,
         to_views(photos, settings.image_side),
-        Points(xyz, sparse.points.rgb),
+        points,
         source=source,
         metric=False,
         skipped=skipped,
     )
+
+
+def _missing_points(photos: list[PosedPhoto], settings: CaptureSettings, seed: int) -> Points:
+    """Poses came without points, but the splats start from points."""
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        staged, cameras = [], []
+        for index, view in enumerate(to_views(photos, settings.image_side)):
+            path = work / "images" / f"{index:04d}.png"
+            write_png(path, view.photo)
+            size = view.camera.width, view.camera.height
+            staged.append(StagedPhoto(view.name, path, *size, view.camera.fx))
+            cameras.append(view.camera)
+        return triangulate(staged, cameras, work, settings, seed)

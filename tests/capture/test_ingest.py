@@ -178,6 +178,14 @@ def test_nerfstudio_poses_are_kept(tmp_path: Path, box_room, ring_cameras) -> No
         assert frame.camera.fx == camera.fx
 
 
+def test_poses_without_points_get_points(tmp_path: Path, box_room, ring_cameras) -> None:
+    source = _nerfstudio(tmp_path / "in", box_room, ring_cameras[:5])
+    points = ingest(source, tmp_path / "out", SETTINGS, 0).points.xyz
+    assert len(points) > 100
+    off_wall = np.abs(np.abs(points - [0, 0, 1.4]) / [2.5, 2.0, 1.4] - 1).min(axis=1)
+    assert np.median(off_wall) < 0.01
+
+
 def test_nerfstudio_distortion_is_removed(tmp_path: Path, box_room, ring_cameras) -> None:
     source = _nerfstudio(tmp_path / "in", box_room, ring_cameras[:2], k1=-0.1, k2=0.01)
     capture = ingest(source, tmp_path / "out", SETTINGS, 0)
