@@ -5,7 +5,7 @@
 // Learnt values: params = [w (3M), raw β, raw γ], with β = BETA_MIN + softplus(raw) and
 // γ = GAMMA_MIN + (GAMMA_MAX - GAMMA_MIN) · sigmoid(raw): without the floor and the bounds,
 // (v + β)^(1/γ) has no derivative at v + β = 0 and none that is finite as γ → 0.
-// A photo clips what is brighter than white, so there a brighter composition is no error.
+// A photo clips what is brighter than white: at CLIPPED a brighter composition is no error.
 // Torch twin: luxcore/splats/losses/twin.py::composition_loss.
 // Compile-time: HEIGHT, WIDTH, LIGHTS, BETA_MIN, GAMMA_MIN, GAMMA_MAX, CLIPPED.
 #line 13 "loss_composition.cl"

@@ -12,7 +12,7 @@ from luxcore.settings.base import Settings
 class SplatSettings(Settings):
     """Knobs of stage 1. The defaults are the embedded profile: small captures in about a minute."""
 
-    iterations: int = Field(1200, ge=0, le=1_000_000, description="optimization steps of one view")
+    iterations: int = Field(800, ge=0, le=1_000_000, description="optimization steps of one view")
     max_side: int = Field(
         1600, ge=16, le=16_384, description="longer photos are shrunk to this many pixels"
     )

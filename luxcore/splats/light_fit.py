@@ -15,8 +15,9 @@ from luxcore.splats.baked import BakedView, bake, padded, padded_zeros
 from luxcore.splats.checkpoint import part, prefixed
 from luxcore.splats.device import Device
 from luxcore.splats.gaussians import Gaussians
-from luxcore.splats.light_views import LightViews, default_weights
+from luxcore.splats.light_views import LightViews
 from luxcore.splats.losses.composition import (
+    START_CURVE,
     CompositionLoss,
     ToneCurve,
     raw_parameters,
@@ -28,9 +29,8 @@ from luxcore.splats.model import GEOMETRY, DeviceGaussians
 from luxcore.splats.optimizer import Adam
 from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 from luxcore.splats.rates import Rates
+from luxcore.splats.starting_weights import starting_weights
 from luxcore.splats.views import Split, view_at
-
-_START_CURVE = ToneCurve(beta=0.002, gamma=2.2)
 
 
 @dataclass
@@ -65,10 +65,10 @@ class LightFit:
         config = RasterConfig(channels=views.channels, antialiased=gaussians.antialiased)
         self.rasterizer = Rasterizer(device, config)
         self.adam, self.done = Adam(device), 0
-        weights = default_weights(on).astype(np.float32)
-        self.params = device.array(raw_parameters(weights, _START_CURVE))
+        weights = starting_weights(views, split.training, on, exposure)
+        self.params = device.array(raw_parameters(weights, START_CURVE))
         # A lamp that was off is in no photo: its scale factor is not to be learnt from them.
-        learnt = np.append(weights.ravel() > 0, [True, True])
+        learnt = np.append(np.repeat([True, *on], 3), [True, True])
         self._learnt = device.array(learnt.astype(np.float32))
         self._one_row = device.zeros((1,), np.uint8) + np.uint8(1)
         self._workspaces: dict[tuple[int, ...], _Workspace] = {}
@@ -157,7 +157,7 @@ class LightFit:
 
     def _compare(self, work: _Workspace, view: int, image: cla.Array) -> None:
         work.image.gradient(image, self.views.targets[view], work.d_image)
-        work.composition.gradient(image, self.views.photos[view], self.params, work.d_image)
+        work.composition.gradient(image, self.views.toned[view], self.params, work.d_image)
 
     def _move_lights(self, work: _Workspace, d_lights: cla.Array, seen: cla.Array) -> None:
         s = self.settings

@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pyopencl.array as cla
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 
 from luxcore.cameras import Camera
 from luxcore.capture import Capture, Frame
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr
+from luxcore.light.agx import agx_inverse
 from luxcore.splats.device import Device
+from luxcore.splats.losses.composition import START_CURVE
+from luxcore.splats.losses.constants import CLIPPED, PHOTO_CLIPPED
 from luxcore.splats.views import fitted_camera, read_view, resized
 
 AMBIENT = "ambient"
@@ -36,6 +39,8 @@ class LightViews:
     """[h, w, 3M] each, linear, divided by the unit of its light."""
     photos: tuple[cla.Array, ...]
     """[h, w, 3] each, display-referred."""
+    toned: tuple[cla.Array, ...]
+    """[h, w, 3] each: what the composition is compared with, see `toned_photo`."""
     units: Float32[np.ndarray, " m"]
 
     @property
@@ -60,8 +65,23 @@ def load_light_views(
     units = light_units(images)
     scale = np.repeat(1 / units, 3)
     targets = tuple(device.array((image * scale).astype(np.float32)) for image in images)
-    photos = (read_view(f, c) for f, c in zip(capture.frames, cameras, strict=True))
-    return LightViews(cameras, targets, tuple(device.array(p) for p in photos), units)
+    photos = [read_view(f, c) for f, c in zip(capture.frames, cameras, strict=True)]
+    toned = tuple(device.array(toned_photo(photo)) for photo in photos)
+    return LightViews(cameras, targets, tuple(device.array(p) for p in photos), toned, units)
+
+
+def toned_photo(photo: Float32[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "h w 3"]:
+    """The photo through the curve T that the composition starts with, instead of AgX.
+
+    The project reads photos as AgX; the paper's T(v) = (v + β)^(1/γ) is not of that shape and,
+    compared with AgX photos, bends the lights to make up for it (measured: 1 dB of the recombined
+    image). So the photo is taken back to linear light and through the starting T, which then
+    learns only how this camera departs from AgX. What the photo clips stays marked as clipped.
+    """
+    linear = np.maximum(agx_inverse(photo), 0)
+    toned = (linear + START_CURVE.beta) ** (1 / START_CURVE.gamma)
+    toned = np.where(photo >= PHOTO_CLIPPED, np.maximum(toned, CLIPPED), np.minimum(toned, CLIPPED))
+    return toned.astype(np.float32)
 
 
 def read_light_images(
@@ -112,8 +132,3 @@ def read_exposure(fuse_dir: Path, capture: Capture) -> float:
     if not (np.isfinite(number) and number > 0):
         raise FormatError(f"{path}: exposure must be positive, got {number}.")
     return number
-
-
-def default_weights(on: Sequence[bool]) -> Float[np.ndarray, "m 3"]:
-    """Scale factors to start from: ambient and lamps that shone count once, the others not."""
-    return np.repeat(np.array([1.0, *(float(o) for o in on)])[:, None], 3, axis=1)

@@ -15,6 +15,7 @@ from luxcore.cameras import Camera, look_at
 from luxcore.capture import Capture, Points, View, write_capture
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import write_exr
+from luxcore.light.agx import agx
 from luxcore.splats.device import open_device
 from luxcore.splats.gaussians import Gaussians, sh_from_color
 from luxcore.splats.light_views import light_names
@@ -83,11 +84,6 @@ def render_colors(room: Room, camera: Camera, colors: np.ndarray) -> np.ndarray:
     return rasterizer.forward(camera, *(device.array(a) for a in arrays)).image.get()
 
 
-def display(linear: np.ndarray) -> np.ndarray:
-    """A plain display curve: gamma 2.2, clipped."""
-    return np.clip(linear, 0, 1) ** (1 / 2.2)
-
-
 def write_room_capture(
     folder: Path, room: Room, views: int = 9, width: int = 64, height: int = 48
 ) -> Capture:
@@ -95,13 +91,13 @@ def write_room_capture(
     total = room.lights.sum(1)
     cameras = room_cameras(views, width, height)
     shots = [
-        View(f"{i}.png", display(render_colors(room, c, total)).astype(np.float32), c)
+        View(f"{i}.png", agx(render_colors(room, c, total)).astype(np.float32), c)
         for i, c in enumerate(cameras)
     ]
     random = np.random.default_rng(5)
     chosen = random.permutation(len(total))[: len(total) // 3]
     xyz = room.gaussians.means[chosen] + random.normal(size=(len(chosen), 3)) * 0.01
-    rgb = np.round(255 * display(total[chosen])).astype(np.uint8)
+    rgb = np.round(255 * agx(total[chosen])).astype(np.uint8)
     points = Points(xyz.astype(np.float32), rgb)
     return write_capture(folder, "box", shots, points, source="synthetic", metric=True)
 

@@ -14,6 +14,7 @@ from luxcore.splats.losses.composition import (
     raw_parameters,
     read_parameters,
 )
+from luxcore.splats.losses.constants import CLIPPED
 from luxcore.splats.losses.image import ImageLoss
 from luxcore.splats.losses.smoothness import (
     ABSENT,
@@ -136,7 +137,7 @@ def run_composition(
 @pytest.mark.parametrize("lights", [1, 3, 9])
 def test_composition_matches_twin(device: Device, lights: int) -> None:
     x, photo, params, units = composition_case(lights)
-    photo[0, :4] = 1.0  # clipped pixels
+    photo[0, :4] = CLIPPED
     value, d_x, d_params = run_composition(device, x, photo, params, units)
     x_t, p_t = (torch.tensor(a, dtype=torch.float64, requires_grad=True) for a in (x, params))
     loss = 0.5 * twin.composition_loss(
@@ -185,7 +186,7 @@ def test_negative_totals_do_not_break_the_power(device: Device) -> None:
 
 def test_clipped_photo_does_not_pull_bright_light_down(device: Device) -> None:
     x, photo, params, units = composition_case(1)
-    x[:], photo[:] = 1000.0, 1.0
+    x[:], photo[:] = 1000.0, CLIPPED
     value, d_x, d_params = run_composition(device, x, photo, params, units)
     assert value == 0
     assert not d_x.any()

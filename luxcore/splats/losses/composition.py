@@ -21,6 +21,10 @@ class ToneCurve:
     gamma: float
 
 
+START_CURVE = ToneCurve(beta=0.002, gamma=2.2)
+"""Where learning starts: about what a display does."""
+
+
 def raw_parameters(weights: Float[np.ndarray, "m 3"], curve: ToneCurve) -> Float[np.ndarray, " p"]:
     """What the kernel learns: w as it is, β before its softplus, γ before its sigmoid."""
     raw_beta = np.log(np.expm1(max(curve.beta - BETA_MIN, 1e-6)))

@@ -23,5 +23,7 @@ BETA_MIN = 1e-4
 """Floor of the tone curve's offset β, relative to a scene exposed around one."""
 GAMMA_MIN, GAMMA_MAX = 1.0, 4.0
 """Bounds of the tone curve's γ: a display curve is never steeper than linear nor beyond these."""
-CLIPPED = 0.98
+PHOTO_CLIPPED = 0.98
 """A photo at or above this display value is clipped: the light may be any amount brighter."""
+CLIPPED = 2.97
+"""Where the toned photo counts as clipped: T of a radiance of 11, which AgX shows as 0.98."""
