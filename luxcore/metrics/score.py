@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from luxcore.light.agx import agx
+from luxcore.light.agx_constants import LINEAR_CEILING
 from luxcore.metrics.image import psnr, ssim
 from luxcore.metrics.lpips import lpips
 from luxcore.metrics.rescale import channel_scale
@@ -19,18 +20,22 @@ Image = Float[np.ndarray, "h w 3"]
 def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) -> dict:
     """PSNR, SSIM and LPIPS on AgX display images after the channel-wise rescale, and unscaled.
 
-    `exposure` is the capture's g: images are AgX(g · I), both linear radiance. Keys: psnr, ssim,
+    `exposure` is the capture's g: images are AgX(g · I), both linear radiance. The scale is fitted
+    where the true picture is not white: a glowing bulb of 500 times white, which every picture
+    shows as white, would else decide over the whole room. Keys: psnr, ssim,
     lpips (None where unavailable), psnr_unscaled, ssim_unscaled, log_rmse (stops, rescaled linear
     HDR). Values of the prediction that are not finite count as black.
     """
     predicted = np.nan_to_num(np.asarray(predicted_linear, np.float32), posinf=0.0, neginf=0.0)
     truth = np.asarray(truth_linear, np.float32)
-    scaled = predicted * channel_scale(predicted, truth).astype(np.float32)
-    shown, plain, target = (_display(i, exposure) for i in (scaled, predicted, truth))
+    shown = truth.max(axis=-1) * exposure < LINEAR_CEILING
+    scale = channel_scale(predicted[shown], truth[shown]) if shown.any() else np.ones(3)
+    scaled = predicted * scale.astype(np.float32)
+    picture, plain, target = (_display(i, exposure) for i in (scaled, predicted, truth))
     return {
-        "psnr": psnr(shown, target),
-        "ssim": ssim(shown, target),
-        "lpips": lpips(shown, target),
+        "psnr": psnr(picture, target),
+        "ssim": ssim(picture, target),
+        "lpips": lpips(picture, target),
         "psnr_unscaled": psnr(plain, target),
         "ssim_unscaled": ssim(plain, target),
         "log_rmse": log_rmse(scaled * exposure, truth * exposure),
