@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from luxcore.decompose.burning import burning_lamps
-from luxcore.errors import DivergedError, InputError
+from luxcore.errors import DivergedError
 from luxcore.light.agx import agx
 from luxcore.models.interface import Decomposer, Decomposition, Geometry
 
@@ -38,14 +38,8 @@ def decompose_photo(
 
     `on` defaults to what the masks' brightness says. The factors c of burning lamps are solved by
     weighted least squares; lamps that are off keep 0.
-    Raises InputError for masks of another size, DivergedError when the model's answer is not
-    finite.
+    Raises DivergedError when the model's answer is not finite.
     """
-    if masks.shape[1:] != image_linear.shape[:2]:
-        raise InputError(
-            f"masks are {masks.shape[2]}x{masks.shape[1]}, "
-            f"the photo is {image_linear.shape[1]}x{image_linear.shape[0]}."
-        )
     exposed = np.maximum(image_linear, 0).astype(np.float32) * np.float32(exposure)
     burning = burning_lamps(exposed, masks) if on is None else on
     light = decomposer.decompose(exposed, masks, burning, geometry, seed)

@@ -51,7 +51,7 @@ def decompose_capture(
             bar.advance(recomposition=f"{recomposition[-1]:.1f} dB")
     write_json(out / "decompose.json", {"references": references, "backend": decomposer.name})
     return {
-        "references": len(views),
+        "references": float(len(views)),
         "recomposition_db": float(np.mean(recomposition)),
         "recomposition_db_worst": float(np.min(recomposition)),
     }

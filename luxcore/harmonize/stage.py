@@ -59,9 +59,9 @@ def harmonize_capture(
         _copy(folder, out)
     write_json(out / "passes.json", plan_record(plan))
     return {
-        "passes": len(plan.passes),
-        "views": len(capture.frames),
-        "disconnected": len(plan.disconnected),
+        "passes": float(len(plan.passes)),
+        "views": float(len(capture.frames)),
+        "disconnected": float(len(plan.disconnected)),
     }
 
 

@@ -16,8 +16,9 @@ from luxcore.models.small.surfaces import Surfaces, lambert_terms, lamp_centres
 SV_CHANNELS = 34
 MV_CHANNELS = SV_CHANNELS + 13
 LAMP_SHARE = slice(27, 30)
+IRRADIANCE = slice(30, 31)
 AMBIENT_SHARE = slice(31, 34)
-"""Channels that hold the first guess at the shares of light, mapped to −1..1."""
+"""Channels of the first guess: shares of light mapped to −1..1, log2 irradiance over 4."""
 
 
 def lamp_features(

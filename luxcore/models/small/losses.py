@@ -13,7 +13,7 @@ from luxcore.models.small.levels import CLIPPED, display_curve
 BRACKETS = ((1.0, 1.0), (0.25, 0.5), (0.0625, 0.25))
 """(exposure, weight): EV0, EV-2, EV-4 of the paper's three brightness levels."""
 
-OFF_WEIGHT = 0.5
+OFF_WEIGHT = 0.8
 """Of lamps that are off in the photo, whose brightness nobody can know: they must not drown the
 lamps that are on."""
 
@@ -27,6 +27,7 @@ def example_loss(fields: LightFields, example: Example) -> Tensor:
         terms.append(_seen_error(light[on], example.lights[on]))
         terms.append(0.5 * _one_light_off_error(fields, example))
         terms.append(0.2 * _fraction_error(fields, example))
+        terms.append(0.02 * _boost_error(light[on], example.lights[on], example))
     if bool((~on).any()):
         share = OFF_WEIGHT * float((~on).float().mean())
         matched = _rescaled(light[~on], example.lights[~on])
@@ -63,6 +64,13 @@ def _fraction_error(fields: LightFields, example: Example) -> Tensor:
     truth = torch.cat([example.ambient[None], example.lights[example.on]]) / total
     keep = torch.cat([example.on.new_ones(1), example.on])
     return (fields.fraction[keep] - truth).abs().mean()
+
+
+def _boost_error(predicted: Tensor, truth: Tensor, example: Example) -> Tensor:
+    """Mean error of a lamp's own clipped emitter, in natural logs: no bracket shows it all."""
+    clipped = (example.photo.amax(0) > CLIPPED) & (example.masks[example.on] > 0.5)
+    difference = torch.log(predicted + 1).mean(1) - torch.log(truth + 1).mean(1)
+    return (difference.abs() * clipped).sum() / clipped.sum().clamp_min(1)
 
 
 def _rescaled(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:

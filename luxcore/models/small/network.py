@@ -14,7 +14,7 @@ import torch.nn.functional as fn
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from luxcore.models.small.features import AMBIENT_SHARE, LAMP_SHARE
+from luxcore.models.small.features import AMBIENT_SHARE, IRRADIANCE, LAMP_SHARE
 
 SV_OUTPUTS = 12
 """Four heads of RGB: lamp logit, ambient logit, log ratio of a lamp that is off, emitter boost."""
@@ -71,7 +71,8 @@ class LampNet(nn.Module):
         for block, skip in zip(self.up, skips[-2::-1], strict=True):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
         outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
-        return torch.cat([outputs[:, :6] + prior_logits(features), outputs[:, 6:]], dim=1)
+        guess = torch.cat([prior_logits(features), prior_log_ratio(features)], dim=1)
+        return torch.cat([outputs[:, :9] + guess, outputs[:, 9:]], dim=1)
 
 
 def prior_logits(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 6 h w"]:
@@ -82,6 +83,13 @@ def prior_logits(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 6 h w"]
     """
     shares = torch.cat([features[:, LAMP_SHARE], features[:, AMBIENT_SHARE]], dim=1)
     return 0.5 * torch.log((shares + 1) / 2 + 0.02)
+
+
+def prior_log_ratio(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 3 h w"]:
+    """What a lamp that is off would add to an evenly lit photo: its irradiance over the mean."""
+    irradiance = torch.exp2(4 * features[:, IRRADIANCE]).clamp_min(1e-3)
+    mean = irradiance.clamp_max(4).mean((2, 3), keepdim=True)
+    return torch.log(irradiance / mean + 0.05).expand(-1, 3, -1, -1)
 
 
 class Residual(nn.Module):

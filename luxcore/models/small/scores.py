@@ -10,6 +10,7 @@ from torch import Tensor
 from luxcore.light.agx import agx
 from luxcore.models.small.examples import Example
 from luxcore.models.small.heads import lamp_light, light_fields
+from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.network import LampNet
 
 
@@ -25,7 +26,9 @@ def mean_psnr(net: LampNet, cases: Sequence[tuple[Tensor, Example]]) -> float:
 
 
 def _psnr(predicted: Tensor, truth: Tensor) -> Tensor:
-    scale = (predicted * truth).sum((1, 2)) / (predicted**2).sum((1, 2)).clamp_min(1e-9)
+    shown = (truth.amax(0) < PHOTO_MAX).to(truth)
+    scale = (predicted * truth * shown).sum((1, 2))
+    scale = scale / (predicted**2 * shown).sum((1, 2)).clamp_min(1e-9)
     shown = agx((predicted * scale[:, None, None]).movedim(0, -1))
     error = (shown - agx(truth.movedim(0, -1))) ** 2
     return -10 * torch.log10(error.mean().clamp_min(1e-8))
