@@ -46,7 +46,8 @@ class Dashboard:
 def dashboards(root: Path, mlflow_port: int, prefect_port: int) -> tuple[Dashboard, Dashboard]:
     """The two servers over a project's records."""
     store = os.environ.get("MLFLOW_TRACKING_URI", f"sqlite:///{root / 'mlflow.db'}")
-    runs = (sys.executable, "-m", "mlflow", "ui", "--backend-store-uri", store)
+    # With more than one worker its supervisor kills workers that need over 5 s to start.
+    runs = (sys.executable, "-m", "mlflow", "ui", "--workers", "1", "--backend-store-uri", store)
     flows = (sys.executable, "-m", "prefect", "server", "start", "--no-services")
     at = ("--host", HOST, "--port")
     api = {"PREFECT_API_URL": f"http://{HOST}:{prefect_port}/api"}
@@ -72,6 +73,8 @@ def serve_dashboards(
     pages = dashboards(root, mlflow_port, prefect_port)
     for page in pages:
         check_port(HOST, page.port)
+    # Unlike an interrupt, a termination would leave the servers behind.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     logs = root / ".lux"
     logs.mkdir(exist_ok=True)
     with ExitStack() as stack:
