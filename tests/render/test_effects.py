@@ -14,12 +14,10 @@ from luxcore.settings.rooms import RoomsSettings
 
 @pytest.fixture(scope="module")
 def plain() -> Room:
-    """A room with an opening, without glass, mirrors, panes or polished metal."""
+    """A room with an opening in which all is matt: no glass, mirrors, panes, metal, varnish."""
     room = next(r for r in (generate_room(s, RoomsSettings()) for s in range(50)) if r.openings)
     calm = Material("paint", (0.5, 0.5, 0.5))
-    sharp = {"glass", "mirror", "pane", "metal"}
-    materials = {k: calm if m.kind in sharp else m for k, m in room.materials.items()}
-    return replace(room, materials=materials)
+    return replace(room, materials=dict.fromkeys(room.materials, calm))
 
 
 def _with(room: Room, material: Material) -> Room:
@@ -52,13 +50,16 @@ def test_caustics_and_glossy_bounces_need_something_sharp(plain: Room) -> None:
     mirror = analyse_effects(_with(plain, Material("mirror", (0.9, 0.9, 0.9))))
     rough = analyse_effects(_with(plain, Material("metal", (0.6, 0.6, 0.6), roughness=0.4)))
     assert not calm.caustics.on
-    assert not rough.caustics.on
+    # Rough metal inside a hood passes 2 to 4 % of a room's light on.
+    assert rough.caustics.on
     assert mirror.caustics.on
+    assert rough.glossy.amount == calm.glossy.amount
     assert mirror.glossy.amount > calm.glossy.amount
 
 
 def test_light_tree_only_with_many_emitters(plain: Room) -> None:
-    few = replace(plain, parts=tuple(p for p in plain.parts if p.emits == 0), spots=())
+    dark = tuple(p for p in plain.parts if p.emits == 0)
+    few = replace(plain, parts=dark, spots=(), openings=(), environment=None)
     assert not analyse_effects(few).light_tree.on
     bulb = Part("bulb", Box((0.1, 0.1, 0.1)), "wall", lamp=0, emits=0.01)
     many = replace(few, parts=(*few.parts, *[bulb] * LIGHT_TREE_FROM))

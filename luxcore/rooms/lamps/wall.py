@@ -17,8 +17,8 @@ def up_down(rng: Rng, palette: Palette) -> LampPiece:
     parts = (
         solid("tube", Lathe(((r, -tall / 2), (r, tall / 2)), 20), palette.metal(), (0, y, 0)),
         solid("plate", Box((0.06, 0.03, tall * 0.6), (0, 0.015, 0)), palette.metal()),
-        glow("mouth", disc(r * 0.9, tall / 2 - 0.015, up=True), share, (0, y, 0)),
-        glow("mouth", disc(r * 0.9, -tall / 2 + 0.015, up=False), 1 - share, (0, y, 0)),
+        glow("mouth", disc(r * 0.9, tall / 2 - 0.004, up=True), share, (0, y, 0)),
+        glow("mouth", disc(r * 0.9, -tall / 2 + 0.004, up=False), 1 - share, (0, y, 0)),
     )
     return LampPiece("up_down", parts, (), tall, r)
 
