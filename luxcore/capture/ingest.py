@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from luxcore.capture.colmap_files import find_model, read_model
+from luxcore.capture.drawn_masks import FOLDER as DRAWN
+from luxcore.capture.drawn_masks import carry_masks
 from luxcore.capture.names import check_id, inside
 from luxcore.capture.nerfstudio import read_nerfstudio
 from luxcore.capture.orientation import room_like
@@ -25,6 +29,18 @@ from luxcore.files.photos import write_png
 from luxcore.settings.capture import CaptureSettings
 
 
+@dataclass(frozen=True)
+class _Found:
+    """What a source gave, before it is written."""
+
+    kind: str
+    photos: list[PosedPhoto]
+    points: Points
+    order: tuple[str, ...]
+    """Names of all photos of the source, placed or not."""
+    skipped: tuple[Skipped, ...] = ()
+
+
 def ingest(
     source: Path,
     out: Path,
@@ -35,7 +51,8 @@ def ingest(
 ) -> Capture:
     """Write the capture `out` from `source`, whole or not at all.
 
-    `source` is a capture, a nerfstudio folder, a COLMAP project, or a folder of photos. The id is
+    `source` is a capture, a nerfstudio folder, a COLMAP project, or a folder of photos, with the
+    user's lamp masks in masks/NNNN_LL.png where there are any. The id is
     the name of `out` unless given; a capture that is copied keeps its own.
     Raises InputError for what cannot be used, LuxError when too few views can be placed.
     """
@@ -47,7 +64,8 @@ def ingest(
         return _copy(source, out)
     if (source / "transforms.json").is_file():
         photos, points = read_nerfstudio(source / "transforms.json")
-        return _write(photos, points, out, identifier, settings, seed, "nerfstudio", [])
+        found = _Found("nerfstudio", photos, points, tuple(p.name for p in photos))
+        return _write(source, found, out, identifier, settings, seed)
     model = find_model(source)
     if model is not None:
         return _from_colmap(source, model, out, identifier, settings, seed)
@@ -77,7 +95,8 @@ def _from_colmap(
     sparse = read_model(model, root)
     files = {image.name: inside(root, image.name, model) for image in sparse.images}
     photos, points = _room_like(sparse, files, {})
-    return _write(photos, points, out, identifier, settings, seed, "colmap", [])
+    found = _Found("colmap", photos, points, tuple(p.name for p in photos))
+    return _write(source, found, out, identifier, settings, seed)
 
 
 def _from_photos(
@@ -96,7 +115,9 @@ def _from_photos(
         files = {p.path.name: p.path for p in staged}
         names = {p.path.name: p.name for p in staged}
         posed, points = _room_like(sparse, files, names)
-        return _write(posed, points, out, identifier, settings, seed, "photos", skipped)
+        order = tuple(path.name for path in photos)
+        found = _Found("photos", posed, points, order, tuple(skipped))
+        return _write(source, found, out, identifier, settings, seed)
 
 
 def _check_enough(
@@ -128,25 +149,28 @@ def _room_like(
 
 
 def _write(
-    photos: list[PosedPhoto],
-    points: Points,
+    source: Path,
+    found: _Found,
     out: Path,
     identifier: str,
     settings: CaptureSettings,
     seed: int,
-    source: str,
-    skipped: list[Skipped],
 ) -> Capture:
+    points = found.points
     if len(points.xyz) == 0:
-        points = _missing_points(photos, settings, seed)
+        points = _missing_points(found.photos, settings, seed)
+    drawn, write_masks = source / DRAWN, None
+    if drawn.is_dir():
+        write_masks = partial(carry_masks, drawn, found.order, found.photos, settings.image_side)
     return write_capture(
         out,
         identifier,
-        to_views(photos, settings.image_side),
+        to_views(found.photos, settings.image_side),
         points,
-        source=source,
+        source=found.kind,
         metric=False,
-        skipped=skipped,
+        skipped=found.skipped,
+        write_masks=write_masks,
     )
 
 

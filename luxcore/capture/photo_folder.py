@@ -93,7 +93,8 @@ def _walk(source: Path) -> list[Path]:
         if count > MAX_FOLDERS:
             raise InputError(f"{source} holds more than {MAX_FOLDERS} folders; name the one.")
         for entry in sorted(folder.iterdir()):
-            if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith("."):
+            hidden = entry.name.startswith(".") or entry.name == "masks"
+            if entry.is_dir() and not entry.is_symlink() and not hidden:
                 folders.append(entry)
             elif entry.is_file():
                 found.append(entry)

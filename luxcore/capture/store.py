@@ -64,6 +64,12 @@ class Capture:
         folder = self.root / "truth"
         return folder if folder.is_dir() else None
 
+    @property
+    def drawn_masks(self) -> Path | None:
+        """Folder with the lamp masks that the user drew."""
+        folder = self.root / "masks"
+        return folder if folder.is_dir() else None
+
 
 @dataclass(frozen=True)
 class View:
@@ -85,8 +91,9 @@ def write_capture(
     exposure: float | None = None,
     skipped: Iterable[Skipped] = (),
     write_truth: Callable[[Path], None] | None = None,
+    write_masks: Callable[[Path], None] | None = None,
 ) -> Capture:
-    """Write a whole capture or nothing; `write_truth` fills its truth/ folder."""
+    """Write a whole capture or nothing; `write_truth` and `write_masks` fill those folders."""
     check_id(capture_id)
     with atomic_folder(Path(folder)) as temporary:
         frames = [_write_view(temporary, index, view) for index, view in enumerate(views)]
@@ -101,9 +108,10 @@ def write_capture(
             "skipped": [{"name": s.name, "reason": s.reason} for s in skipped],
         }
         write_json(temporary / "capture.json", about)
-        if write_truth is not None:
-            (temporary / "truth").mkdir()
-            write_truth(temporary / "truth")
+        for name, fill in (("truth", write_truth), ("masks", write_masks)):
+            if fill is not None:
+                (temporary / name).mkdir()
+                fill(temporary / name)
     return load_capture(Path(folder))
 
 

@@ -22,7 +22,8 @@ def find_lamps(
 ) -> LampMasks:
     """Write the lamps of a capture into the folder `out`, whole or not at all.
 
-    `drawn` is a folder of the user's own `NNNN_LL.png` masks; it goes before all else.
+    `drawn` is a folder of the user's own `NNNN_LL.png` masks; it goes before all else, and next
+    come the masks that the user drew beside the photos, unless the settings ask for others.
     Raises LuxError when no lamp is found, InputError for masks that cannot be used.
     """
     lamps = _lamps(capture, settings, drawn)
@@ -33,6 +34,8 @@ def find_lamps(
 
 
 def _lamps(capture: Capture, settings: MasksSettings, drawn: Path | None) -> list[FoundLamp]:
+    if drawn is None and settings.source == "best":
+        drawn = capture.drawn_masks
     if drawn is not None:
         return folder_lamps(capture, drawn, settings)
     if settings.source == "truth" or (settings.source == "best" and capture.truth is not None):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from luxcore.capture.drawn_masks import mask_files
 from luxcore.capture.store import Capture, read_object
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr
@@ -16,8 +15,6 @@ from luxcore.files.photos import read_mask, read_photo
 from luxcore.masks.references import best_views, photo_sharpness
 from luxcore.masks.store import FoundLamp, Mask
 from luxcore.settings.masks import MasksSettings
-
-_NAME = re.compile(r"(\d{4})_(\d{2})\.png")
 
 ON_RATIO = 1.5
 """A lamp whose brightest pixels are this much brighter than the median photo pixel is on."""
@@ -59,7 +56,7 @@ def folder_lamps(capture: Capture, folder: Path, settings: MasksSettings) -> lis
 
     Raises InputError for a name, view, size or mask that cannot be used.
     """
-    files = _user_files(folder, len(capture.frames))
+    files = mask_files(Path(folder), len(capture.frames))
     sharpness = capture_sharpness(capture)
     lamps: dict[int, dict[int, Mask]] = {}
     for view, lamp, path in files:
@@ -92,21 +89,6 @@ def _truth_mask(path: Path, layers: dict[str, np.ndarray], light: int) -> Mask:
         if mask.any():
             break
     return mask
-
-
-def _user_files(folder: Path, views: int) -> Iterator[tuple[int, int, Path]]:
-    folder = Path(folder)
-    files = sorted(folder.glob("*.png")) if folder.is_dir() else []
-    if not files:
-        raise InputError(f"{folder} holds no masks named NNNN_LL.png (view, lamp).")
-    for path in files:
-        match = _NAME.fullmatch(path.name)
-        if match is None:
-            raise InputError(f"{path} is not named NNNN_LL.png (view, lamp).")
-        view, lamp = int(match[1]), int(match[2])
-        if view >= views:
-            raise InputError(f"{path} is for view {view}, the capture has {views} views.")
-        yield view, lamp, path
 
 
 def _looks_on(capture: Capture, masks: dict[int, Mask]) -> bool:

@@ -13,7 +13,7 @@ class MasksSettings(Settings):
     """How lamps are found and cut out."""
 
     source: Literal["best", "auto", "truth"] = Field(
-        "best", description="best: from the truth where a capture has it, else found in the photos"
+        "best", description="best: the user's masks, else the truth, else found in the photos"
     )
     max_lamps: int = Field(6, ge=1, le=16, description="lamps kept, strongest first")
     references: int = Field(3, ge=1, le=16, description="reference views named per lamp")

@@ -219,6 +219,29 @@ def test_bad_nerfstudio_folders(tmp_path: Path, box_room, ring_cameras, change, 
     assert not (tmp_path / "out").exists()
 
 
+def test_drawn_masks_follow_their_photos(tmp_path: Path, box_room, ring_cameras) -> None:
+    source = _nerfstudio(tmp_path / "in", box_room, ring_cameras[:3], k1=-0.1)
+    rows, columns = np.indices((360, 480))
+    disc = np.hypot(rows - 180, columns - 300) < 60
+    write_png(source / "masks" / "0002_00.png", disc)
+    capture = ingest(source, tmp_path / "out", CaptureSettings(image_side=120), 0)
+    assert capture.drawn_masks is not None
+    assert [f.name for f in capture.drawn_masks.iterdir()] == ["0002_00.png"]
+    stored = read_photo(capture.drawn_masks / "0002_00.png")[..., 0] > 0.5
+    assert stored.shape == (90, 120)
+    # A quarter of the size, and barrel distortion removed pushes it outward and enlarges it.
+    rows, columns = np.nonzero(stored)
+    assert rows.mean() == pytest.approx(45, abs=2)
+    assert 74 < columns.mean() < 80
+    assert 0.9 < stored.sum() / (np.pi * 15**2) < 1.4
+    write_png(source / "masks" / "0001_00.png", np.ones((50, 50)))
+    with pytest.raises(InputError, match=r"0001_00\.png is 50x50"):
+        ingest(source, tmp_path / "out2", SETTINGS, 0)
+    (source / "masks" / "0001_00.png").rename(source / "masks" / "0007_00.png")
+    with pytest.raises(InputError, match="for view 7, the capture has 3 views"):
+        ingest(source, tmp_path / "out2", SETTINGS, 0)
+
+
 def test_a_capture_is_copied_with_its_truth(tmp_path: Path, box_room, ring_cameras) -> None:
     views = [View(f"{i}.png", box_room.photo(c)[0], c) for i, c in enumerate(ring_cameras[:2])]
     write_capture(
