@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from luxcore.report.gallery import Gallery
 from luxcore.report.sources import CaptureFiles, find_captures, light_names
 
 SHOWN = 6
+OF_EACH_LAMP = 2
+"""Views of one lamp among the worst; neighbouring views fail alike."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +41,28 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
         for view in range(len(capture.images)):
             cases = _cases(capture, view)
             scores += [case.psnr_db for case in cases]
-            worst = sorted([*worst, *cases], key=lambda case: case.psnr_db)[:SHOWN]
+            worst = _worst([*worst, *cases])
+    worst = worst[:SHOWN]
     if not worst:
         return None
     strips = tuple(_strip(case, gallery) for case in worst)
     intro = (
-        f"The {len(worst)} worst of {len(scores)} (view, lamp) pairs with known truth, by PSNR "
-        "after AgX with one factor per colour channel. "
+        f"The worst of {len(scores)} (view, lamp) pairs with known truth, at most {OF_EACH_LAMP} "
+        "views of a lamp, by PSNR after AgX with one factor per colour channel. "
         f"Median of all: {np.median(scores):.1f} dB."
     )
     return Section("Failures", "failures", intro, (_table(worst), *strips))
+
+
+def _worst(cases: list[Case]) -> list[Case]:
+    """The worst views of every lamp, worst first."""
+    seen: Counter[tuple[str, str]] = Counter()
+    kept = []
+    for case in sorted(cases, key=lambda case: case.psnr_db):
+        seen[case.capture.id, case.light] += 1
+        if seen[case.capture.id, case.light] <= OF_EACH_LAMP:
+            kept.append(case)
+    return kept
 
 
 def _cases(capture: CaptureFiles, view: int) -> list[Case]:
