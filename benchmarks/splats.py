@@ -30,6 +30,7 @@ from benchmarks.splat_measure import (
     machine_limits,
     measure,
 )
+from benchmarks.splat_relight import relight_row
 from benchmarks.splat_scenes import BenchmarkScene, captured_view, random_view
 from luxcore.files.atomic import write_json
 from luxcore.splats.baked import bake, padded, padded_zeros
@@ -208,6 +209,7 @@ def run_all(device: Device, quick: bool) -> dict[str, Any]:
         "torch": [torch_row(scenes[0])],
         "blending": kernel_rows(device, big),
         "frozen_8_lamps": frozen_row(device, big),
+        "relight_8_lamps": relight_row(device, big),
         "memory": memory_row(device, big),
         "digest": digest(device, scenes[0]),
         "curves": {
@@ -259,6 +261,7 @@ def print_report(report: dict[str, Any]) -> None:
         ]
         print(f"{curve:10s}", "  ".join(cells))
     print("frozen, 8 lamps:", {k: round(v, 1) for k, v in report["frozen_8_lamps"].items()})
+    print("relight, 8 lamps:", {k: round(v, 1) for k, v in report["relight_8_lamps"].items()})
     print("memory:", {k: round(v, 1) for k, v in report["memory"].items()})
     print("1,000,000 at 1080p:", report["million_1080p"])
     print("digest:", report["digest"])
