@@ -41,7 +41,7 @@ def command(
     budget: str | None,
     quality: str | None,
 ) -> None:
-    """What accuracy costs in time: one Pareto curve per knob.
+    """What accuracy costs in time: one Pareto curve per knob, the rest at the program's defaults.
 
     Knobs measured before on the same capture and machine are kept in OUT/tradeoff.json.
     With --budget or --quality nothing is measured: settings are chosen from the last sweep, and
@@ -58,7 +58,6 @@ def command(
 def _measure(
     artifacts: Path, capture: str, out: Path, names: tuple[str, ...], repeats: int
 ) -> None:
-    from luxcore.settings.load import load_settings
     from luxcore.settings.project import ProjectSettings
     from luxcore.tradeoff.knob import Bench
     from luxcore.tradeoff.knobs import KNOBS, ORDER
@@ -68,14 +67,14 @@ def _measure(
     chosen = [knob for knob in KNOBS if not names or any(name in knob.name for name in names)]
     if not chosen:
         raise InputError(f"no knob is called so; there are: {'; '.join(k.name for k in KNOBS)}.")
-    file = Path("params.yaml")
-    params = load_settings(file) if file.is_file() else ProjectSettings()
     with tempfile.TemporaryDirectory(prefix="lux-tradeoff-") as scratch:
         sweeps = []
         for index, knob in enumerate(chosen):
             folder = Path(scratch) / str(index)
             folder.mkdir()
-            sweeps.append(measure(knob, Bench(artifacts, folder, params, capture), repeats))
+            sweeps.append(
+                measure(knob, Bench(artifacts, folder, ProjectSettings(), capture), repeats)
+            )
             _tell(sweeps[-1])
             about = _about(capture)
             # After every knob: a sweep that is interrupted keeps what it has measured.
