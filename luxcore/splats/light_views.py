@@ -78,10 +78,16 @@ def toned_photo(photo: Float32[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "h w
     image). So the photo is taken back to linear light and through the starting T, which then
     learns only how this camera departs from AgX. What the photo clips stays marked as clipped.
     """
-    linear = np.maximum(agx_inverse(photo), 0)
+    # A photo repeats its colours: the inverse is found once for each of them, to 8 bits.
+    codes = np.round(np.clip(photo, 0, 1) * 255).astype(np.int32).reshape(-1, 3)
+    packed, where = np.unique(codes @ [1 << 16, 1 << 8, 1], return_inverse=True)
+    colors = np.stack([packed >> 16, packed >> 8 & 255, packed & 255], axis=1) / 255
+    linear = np.maximum(agx_inverse(colors), 0)
     toned = (linear + START_CURVE.beta) ** (1 / START_CURVE.gamma)
-    toned = np.where(photo >= PHOTO_CLIPPED, np.maximum(toned, CLIPPED), np.minimum(toned, CLIPPED))
-    return toned.astype(np.float32)
+    # Just below or at the mark that the loss reads as "the photo clips here".
+    unclipped = np.minimum(toned, np.nextafter(np.float32(CLIPPED), np.float32(0)))
+    toned = np.where(colors >= PHOTO_CLIPPED, np.maximum(toned, CLIPPED), unclipped)
+    return toned[where].reshape(photo.shape).astype(np.float32)
 
 
 def read_light_images(

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32
 
 from luxcore.capture import Capture
 from luxcore.errors import DivergedError
@@ -27,12 +26,13 @@ from luxcore.splats.checkpoint import CheckpointFolder
 from luxcore.splats.device import open_device
 from luxcore.splats.initial import scene_extent
 from luxcore.splats.light_fit import LightFit
-from luxcore.splats.light_views import light_names, load_light_views, read_exposure
+from luxcore.splats.light_quality import LightQuality
+from luxcore.splats.light_views import load_light_views, read_exposure
 from luxcore.splats.ply import read_ply
 from luxcore.splats.rates import Rates
 from luxcore.splats.relighting import baked_gaussians, render_scene, solo
 from luxcore.splats.scene import Scene, SceneLamp, SceneTone, save_scene
-from luxcore.splats.views import psnr, split_views
+from luxcore.splats.views import split_views
 
 _VERSION = 1
 """Raised when the same settings would no longer give the same lights."""
@@ -81,41 +81,21 @@ def fit_lights(
     fit = _prepare(capture, stage1_dir, fuse_dir, lamps, settings, seed)
     key = _run_key(capture, stage1_dir, fuse_dir, lamps, settings, seed)
     folder = CheckpointFolder(checkpoint, key) if checkpoint else None
-    curve = _run(fit, settings, folder, capture.id, quiet)
+    quality = LightQuality(fit)
+    curve = _run(fit, quality, settings, folder, capture.id, quiet)
     scene = _scene(fit, capture, lamps)
     log(_mixing_line(scene))
-    metrics = measure(fit, scene)
+    counts = {
+        "gaussians": fit.model.count,
+        "iterations": fit.done,
+        "views": scene.views,
+        "views_heldout": len(fit.split.held_out),
+    }
+    metrics = {**quality.metrics(), **{name: float(count) for name, count in counts.items()}}
     _write(scene, fit, capture, out, metrics, curve)
     if folder is not None:
         folder.clear()
     return Stage2Result(metrics, tuple(curve))
-
-
-def measure(fit: LightFit, scene: Scene) -> dict[str, float]:
-    """Held-out quality per light and recombined; training views where none are held out.
-
-    PSNR (dB) of AgX(exposure · radiance); `relative_error` is Σ|error| / Σ light, linear.
-    """
-    views = fit.split.held_out or fit.split.training
-    names = light_names(len(scene.lamps))
-    psnrs, relative, composed = [], [], []
-    weights, _ = fit.mixing()
-    for view in views:
-        fitted, target = fit.render(view), _target(fit, view)
-        psnrs.append(_light_psnrs(fitted, target, fit.exposure))
-        error = np.abs(fitted - target).sum(axis=(0, 1, 3))
-        relative.append(error / np.maximum(target.sum(axis=(0, 1, 3)), 1e-9))
-        total = (fitted * weights).sum(axis=2) * fit.exposure
-        composed.append(psnr(agx(total), fit.views.photos[view].get()))
-    means, errors = np.mean(psnrs, axis=0), np.mean(relative, axis=0)
-    metrics = {"psnr_composed": float(np.mean(composed)), "psnr_lights": float(np.mean(means))}
-    metrics |= {f"psnr_{name}": float(value) for name, value in zip(names, means, strict=True)}
-    metrics |= {
-        f"relative_error_{name}": float(value) for name, value in zip(names, errors, strict=True)
-    }
-    counts = {"gaussians": fit.model.count, "iterations": fit.done, "views": scene.views}
-    counts["views_heldout"] = len(fit.split.held_out)
-    return {**metrics, **{name: float(count) for name, count in counts.items()}}
 
 
 def _prepare(
@@ -145,6 +125,7 @@ def _prepare(
 
 def _run(
     fit: LightFit,
+    quality: LightQuality,
     settings: RelightSettings,
     folder: CheckpointFolder | None,
     name: str,
@@ -158,7 +139,7 @@ def _run(
         while fit.done < iterations:
             fit.step()
             if fit.done % settings.curve_every == 0 or fit.done == iterations:
-                curve.append(_measure_curve(fit, spent + time.monotonic() - start))
+                curve.append(_measure_curve(fit, quality, spent + time.monotonic() - start))
                 bar.advance(1, psnr=f"{curve[-1].psnr_lights:.1f}")
             else:
                 bar.advance(1)
@@ -179,26 +160,10 @@ def _resume(fit: LightFit, folder: CheckpointFolder | None) -> list[LightCurvePo
     return [LightCurvePoint(int(i), float(s), float(p)) for i, s, p in rows]
 
 
-def _measure_curve(fit: LightFit, seconds: float) -> LightCurvePoint:
-    views = fit.split.held_out or fit.split.training
+def _measure_curve(fit: LightFit, quality: LightQuality, seconds: float) -> LightCurvePoint:
     if not np.isfinite(fit.lights.get()).all() or not np.isfinite(fit.params.get()).all():
         raise DivergedError(f"the lights stopped being finite by iteration {fit.done}.")
-    quality = [_light_psnrs(fit.render(v), _target(fit, v), fit.exposure) for v in views]
-    return LightCurvePoint(fit.done, seconds, float(np.mean(quality)))
-
-
-def _light_psnrs(
-    fitted: Float32[np.ndarray, "h w m 3"],
-    target: Float32[np.ndarray, "h w m 3"],
-    exposure: float,
-) -> list[float]:
-    lights = range(fitted.shape[2])
-    return [psnr(agx(exposure * fitted[:, :, m]), agx(exposure * target[:, :, m])) for m in lights]
-
-
-def _target(fit: LightFit, view: int) -> Float32[np.ndarray, "h w m 3"]:
-    image = fit.views.targets[view].get()
-    return image.reshape(*image.shape[:2], -1, 3) * fit.views.units[:, None]
+    return LightCurvePoint(fit.done, seconds, quality.psnr_lights())
 
 
 def _scene(fit: LightFit, capture: Capture, lamps: Sequence[Lamp]) -> Scene:

@@ -217,6 +217,6 @@ def test_toned_photo_keeps_what_is_clipped() -> None:
     toned = toned_photo(grey)[:, 0, 0]
     assert (np.diff(toned) >= 0).all()
     np.testing.assert_array_equal(toned >= CLIPPED, grey[:, 0, 0] >= 0.98)
-    # AgX shows 0.18 as middle grey: back through its inverse, T starts at (0.18 + β)^(1/γ).
+    # Back through AgX's inverse, T starts at (0.18 + β)^(1/γ); half an 8-bit step is 0.5 %.
     shown = agx(np.full((1, 1, 3), 0.18, np.float32)).astype(np.float32)
-    assert toned_photo(shown)[0, 0, 0] == pytest.approx(0.182 ** (1 / 2.2), rel=2e-3)
+    assert toned_photo(shown)[0, 0, 0] == pytest.approx(0.182 ** (1 / 2.2), rel=5e-3)
