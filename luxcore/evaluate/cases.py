@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.data.compact import RenderedView
 from luxcore.data.crops import LitCrop, with_lamps
-from luxcore.data.store import ViewStore
+from luxcore.data.store import AnyView, ViewStore
 from luxcore.data.training import aimed_crop, generator, lamps_in_sight
 from luxcore.light.agx import agx, agx_inverse
 from luxcore.light.exposure import estimate_exposure
@@ -36,7 +34,7 @@ class LampCase:
 
 
 def single_cases(
-    views: Sequence[Path | RenderedView], size_px: int, seed: int, *, on: bool, limit: int
+    views: Sequence[AnyView], size_px: int, seed: int, *, on: bool, limit: int
 ) -> list[LampCase]:
     """One photo for each (room, lamp) of `views` that can be seen, the lamp on or off in it.
 

@@ -1,17 +1,27 @@
-"""Which rendered views of a dataset folder are evaluated on."""
+"""Which rendered views of a dataset are evaluated on, whatever layout it has."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from luxcore.data.compact import list_rendered
+from luxcore.data.store import AnyView
 from luxcore.errors import InputError
 
 
-def evaluation_views(dataset: Path) -> list[Path]:
-    """Stems of the views below `dataset`, of its `test` folder where it has one."""
+def evaluation_views(dataset: Path) -> Sequence[AnyView]:
+    """The views at `dataset` (of its `test` folder where it has one), in the compact form or in
+    the public layout: a shard, a scene, or a folder of either; nothing is unpacked.
+
+    Raises InputError when there are none.
+    """
     dataset = Path(dataset)
-    if not dataset.is_dir():
-        raise InputError(f"{dataset} is not a folder.")
-    test = dataset / "test"
-    return list_rendered(test if test.is_dir() else dataset)
+    if not dataset.exists():
+        raise InputError(f"{dataset} does not exist.")
+    root = dataset / "test" if (dataset / "test").is_dir() else dataset
+    if root.is_dir() and any(root.rglob("*.masks.exr")):
+        return list_rendered(root)
+    from luxcore.data.public_reader import public_views
+
+    return public_views(root)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from luxcore.data.crops import LitCrop
 from luxcore.data.multiview import MultiViewSets
+from luxcore.data.store import AnyView
 from luxcore.evaluate.captures import capture_group
 from luxcore.evaluate.cases import single_cases
 from luxcore.evaluate.multi import MultiModels, MultiResult, multi_table
@@ -30,7 +31,7 @@ NOTE = "Our rows are measured on rooms of this project, the paper's on its own 3
 
 
 def evaluate_models(
-    views: Sequence[Path],
+    views: Sequence[AnyView],
     captures: Sequence[tuple[Path, Path]],
     out: Path,
     settings: EvaluateSettings,
@@ -52,7 +53,7 @@ def evaluate_models(
 
 
 def multi_groups(
-    views: Sequence[Path],
+    views: Sequence[AnyView],
     captures: Sequence[tuple[Path, Path]],
     settings: EvaluateSettings,
     seed: int,
@@ -88,7 +89,7 @@ def open_models(
 
 
 def _evaluate_single(
-    views: Sequence[Path],
+    views: Sequence[AnyView],
     decomposer: Decomposer,
     out: Path,
     settings: EvaluateSettings,

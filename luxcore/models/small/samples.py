@@ -45,9 +45,13 @@ class CropPool:
     def relit(self, rng: Generator, views: int | None = None) -> list[LitCrop]:
         """A random group in random order under new light (`views` of it, or all)."""
         group = self.groups[int(rng.integers(len(self.groups)))]
-        order = rng.permutation(len(group))[:views]
-        light = draw_relighting(rng, len(group[0].on))
-        return exposed([light.apply(group[int(i)]) for i in order], rng)
+        return relit([group[int(i)] for i in rng.permutation(len(group))[:views]], rng)
+
+
+def relit(group: Sequence[LitCrop], rng: Generator) -> list[LitCrop]:
+    """The same photos in the same order, all under one new light."""
+    light = draw_relighting(rng, len(group[0].on))
+    return exposed([light.apply(crop) for crop in group], rng)
 
 
 def chw(image: np.ndarray) -> torch.Tensor:

@@ -26,7 +26,7 @@ from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_feature
 from luxcore.models.small.fit import Batches, FitResult, FitSettings, fit
 from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS, LampNet, NetworkShape
 from luxcore.models.small.pictures import validation_sheet
-from luxcore.models.small.samples import CropPool
+from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.scores import mean_psnr
 from luxcore.models.small.sketch import SketchRooms
 from luxcore.models.small.weights import load_network, save_weights, shipped_weights
@@ -139,8 +139,7 @@ def single_cases(pool: CropPool, seed: int) -> Cases:
     cases = []
     for number, crop in enumerate(pool.photos()):
         rng = Generator(PCG64(SeedSequence((seed, number))))
-        relit = CropPool(((crop,),)).relit(rng)[0]
-        example = to_example(relit, geometry=number % 2 == 1)
+        example = to_example(relit([crop], rng)[0], geometry=number % 2 == 1)
         if len(example.on):
             features = lamp_features(example.photo, example.masks, example.on, example.surfaces)
             cases.append((features, example))
@@ -152,7 +151,7 @@ def group_cases(pool: CropPool, seed: int) -> Cases:
     cases = []
     for number, group in enumerate(pool.groups):
         rng = Generator(PCG64(SeedSequence((seed, number))))
-        reference, *targets = CropPool((group,)).relit(rng)
+        reference, *targets = relit(group, rng)
         known = reference.masks.any((1, 2))
         cases += [group_example(t, [reference], known) for t in targets if known.any()]
     return cases
