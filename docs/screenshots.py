@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 CHROMIUM = "/usr/bin/chromium"
+QUALITY = 85
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
 EVENING = "split=40&l1=0,0,o"
 """The first lamp off, the photo on the left."""
@@ -29,7 +30,7 @@ def shoot(browser: Browser, address: str, out: Path, size: tuple[int, int], wait
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.goto(address)
     page.wait_for_timeout(wait_ms)
-    page.screenshot(path=str(out))
+    page.screenshot(path=str(out), type="jpeg", quality=QUALITY)
     page.close()
     print(out)
 
@@ -41,14 +42,15 @@ def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:
     page.goto(f"http://127.0.0.1:{port}")
     page.get_by_text("Exact picture").wait_for(timeout=120_000)
     page.wait_for_timeout(2000)
-    page.locator("button[class*=close], [aria-label=Close]").first.click(timeout=2000, force=True)
+    # Headless Chromium draws in software, which viser remarks on.
+    page.locator(".mantine-Notification-closeButton").first.click()
     page.wait_for_timeout(500)
-    page.screenshot(path=str(out / "viewer.png"))
+    page.screenshot(path=str(out / "viewer.jpg"), type="jpeg", quality=QUALITY)
     page.get_by_role("checkbox").nth(2).uncheck()
     page.get_by_text("Fast preview").wait_for()
     page.get_by_text("Exact picture").wait_for(timeout=120_000)
     page.wait_for_timeout(2000)
-    page.screenshot(path=str(out / "viewer_lamp_off.png"))
+    page.screenshot(path=str(out / "viewer_lamp_off.jpg"), type="jpeg", quality=QUALITY)
     viewer.close()
 
 
@@ -64,12 +66,12 @@ def main() -> None:
     blend = f"{reports}/blend-demo.html#{urllib.parse.quote(EVENING, safe='=&,')}"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        shoot(browser, f"{reports}/index.html", out / "report.png", (1200, 1000), 1500)
-        shoot(browser, blend, out / "explorer.png", (1400, 860), 3000)
-        shoot(browser, blend, out / "explorer_phone.png", (390, 844), 3000)
+        shoot(browser, f"{reports}/index.html", out / "report.jpg", (1200, 1000), 1500)
+        shoot(browser, blend, out / "explorer.jpg", (1400, 860), 3000)
+        shoot(browser, blend, out / "explorer_phone.jpg", (390, 844), 3000)
         for name in ("mlflow", "prefect"):
             if address := getattr(given, name):
-                shoot(browser, address, out / f"{name}.png", (1400, 860), 8000)
+                shoot(browser, address, out / f"{name}.jpg", (1400, 860), 8000)
         if given.scene.is_dir():
             shoot_viewer(browser, given.scene, out, 8133)
         browser.close()

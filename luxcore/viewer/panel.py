@@ -26,6 +26,8 @@ SOURCES: tuple[ColourSource, ...] = ("as in the photos", "temperature", "RGB")
 FOLDERS_OPEN = 4
 """With more lamps than this their folders start closed."""
 
+THUMBNAIL_PX = 96
+
 
 class LightRow:
     """Widgets of one light."""
@@ -33,7 +35,7 @@ class LightRow:
     def __init__(self, gui: Any, name: str, row: Row, thumbnail: Path | None, opened: bool) -> None:
         with gui.add_folder(name, expand_by_default=opened):
             if thumbnail is not None:
-                gui.add_image(np.round(read_photo(thumbnail) * 255).astype(np.uint8))
+                gui.add_image(_small(read_photo(thumbnail)))
             self.on = gui.add_checkbox("on", row.on)
             self.solo = gui.add_checkbox("solo", False, hint="only this light")
             self.stops = gui.add_slider("stops", -MAX_STOPS, MAX_STOPS, 0.1, 0.0)
@@ -66,6 +68,17 @@ class LightRow:
             rgb = srgb_decode(np.array(self.rgb.value, float) / 255)
             return tuple(float(v) for v in rgb)  # type: ignore[return-value]
         return None
+
+
+def _small(picture: np.ndarray) -> np.ndarray:
+    """uint8, at most THUMBNAIL_PX wide: the panel shows pictures at their own size."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (THUMBNAIL_PX, max(1, round(height * THUMBNAIL_PX / width)))
+    if width > THUMBNAIL_PX:
+        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return np.round(picture * 255).astype(np.uint8)
 
 
 class Panel:

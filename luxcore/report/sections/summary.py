@@ -40,5 +40,5 @@ def _costs(timings: dict[str, dict[str, Any]]) -> Table:
         "",
         ("stage", "seconds (wall)", "peak memory, MB"),
         rows,
-        note=f"{total:.0f} s in all, if every stage ran alone. Times are of the last execution.",
+        note=f"{total:.0f} s in all, each stage by its last execution.",
     )

@@ -61,8 +61,8 @@ BRACKETS = Knob(
     name="exposures merged for each lamp",
     choices=tuple(Choice(label, {}) for label in BRACKETS_EV),
     error="mean error, share of the lamp's light",
-    why="One exposure loses the lamp itself; three reach 2^6.5 · 16 above middle grey, as in the "
-    "paper, and five add time but hardly accuracy.",
+    why="One exposure loses the lamp itself; three hold it, as in the paper, and five cost half as "
+    "much again for a fifth less error.",
     prepare=_prepare,
     run=_run,
     fixed_default="EV 0, −2, −4",
