@@ -99,17 +99,28 @@ class Device:
 
         With `group`, work-groups have that size along the first axis and the number of work-items
         is rounded up to a multiple of it: the kernel must return for the ones beyond its count.
-        Without it, the largest power of two up to 64 that divides the number. Never the driver's
+        Without it, whole groups of 64 run first and the rest in groups of one (so the kernel must
+        not ask for its global size); along several axes,
+        groups of the largest power of two up to 64 that divides the first. Never the driver's
         choice: PoCL compiles a kernel again for every size of work-group it meets.
         An int becomes int32, a float becomes float32, None and an empty array a null pointer.
         """
         items = (work_items,) if isinstance(work_items, int) else work_items
         if not all(items):
             return
+        values = [_argument(a) for a in arguments]
+        ones = tuple(1 for _ in items[1:])
+        if group is None and not ones:
+            whole = items[0] // DEFAULT_GROUP * DEFAULT_GROUP
+            if whole:
+                kernel(self.queue, (whole,), (DEFAULT_GROUP,), *values)
+            if items[0] > whole:
+                rest = (items[0] - whole,)
+                kernel(self.queue, rest, (1,), *values, global_offset=(whole,))
+            return
         size = group or math.gcd(items[0], DEFAULT_GROUP)
         rounded = (-(-items[0] // size) * size, *items[1:])
-        local = (size, *(1 for _ in items[1:]))
-        kernel(self.queue, rounded, local, *(_argument(a) for a in arguments))
+        kernel(self.queue, rounded, (size, *ones), *values)
 
     def _build(self, name: str, options: tuple[tuple[str, str], ...]) -> Kernels:
         path = KERNEL_FOLDER / f"{name}.cl"

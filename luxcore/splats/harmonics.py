@@ -28,7 +28,9 @@ def sh_forward(
     n = means.shape[0]
     rgb = device.empty((n, 3))
     kernels = _kernels(device, coefficients, degree, clamp)
-    device.launch(kernels.harmonics_forward, n, n, _float4(centre), means, coefficients, rgb)
+    device.launch(
+        kernels.harmonics_forward, n, n, _float4(centre), means, coefficients, rgb, group=64
+    )
     return rgb
 
 
@@ -48,7 +50,7 @@ def sh_backward(
     kernels = _kernels(device, coefficients, degree, clamp)
     device.launch(
         kernels.harmonics_backward, n, n, _float4(centre), means, coefficients, rgb, d_rgb,
-        d_coefficients, d_means,
+        d_coefficients, d_means, group=64,
     )  # fmt: skip
     return d_coefficients, d_means
 
