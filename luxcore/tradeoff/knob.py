@@ -81,6 +81,11 @@ def _setting(params: ProjectSettings, path: str) -> Any:
     return value
 
 
+def around(default: int, *factors: float) -> tuple[int, ...]:
+    """Whole multiples of a default, so that a sweep follows it when it moves."""
+    return tuple(max(1, round(default * factor)) for factor in factors)
+
+
 @dataclass
 class Stopwatch:
     """Seconds of this process, its threads and its finished children."""

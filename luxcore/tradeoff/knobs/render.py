@@ -14,7 +14,7 @@ from luxcore.render.views import PanoramaView
 from luxcore.rooms.batch import demo_room
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
-from luxcore.tradeoff.knob import Bench, Choice, Knob, Work
+from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, around
 
 HEIGHT = 64
 """Rows of the panorama that is rendered: noise for each sample does not depend on size."""
@@ -70,13 +70,17 @@ def _choice(spp: int, denoise: str) -> Choice:
     return Choice(label, {"render.spp": spp, "render.denoise": denoise})
 
 
+DEFAULT = RenderSettings()
+LOW, SPP, HIGH, VERY_HIGH = around(DEFAULT.spp, 0.5, 1, 4, 16)
+
 SAMPLES = Knob(
     name="samples per pixel and denoiser",
     choices=tuple(
         _choice(spp, denoise)
         for spp, denoise in (
-            (4, "off"), (12, "off"), (48, "off"), (192, "off"),
-            (4, "balanced"), (12, "fast"), (12, "balanced"), (12, "high"), (48, "balanced"),
+            *((spp, "off") for spp in (LOW, SPP, HIGH, VERY_HIGH)),
+            *((spp, DEFAULT.denoise) for spp in (LOW, SPP, HIGH)),
+            *((SPP, other) for other in ("fast", "balanced", "high") if other != DEFAULT.denoise),
         )
     ),
     error="mean error of a lamp, share of its light",
@@ -84,4 +88,4 @@ SAMPLES = Knob(
     "and below the default's samples the denoiser starts to invent.",
     prepare=_prepare,
     run=_run,
-)  # fmt: skip
+)

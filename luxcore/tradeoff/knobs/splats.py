@@ -19,7 +19,7 @@ from luxcore.splats.ply import read_ply
 from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 from luxcore.splats.stage1 import fit_geometry
 from luxcore.splats.stage2 import fit_lights
-from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
+from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, around, stopwatch
 
 MAX_SIDE = 160
 """Photos are shrunk to this: many short runs say more than one long one."""
@@ -71,7 +71,10 @@ ERROR = "RMS error of held-out views, display 0..1"
 
 ITERATIONS = Knob(
     name="iterations of stage 1",
-    choices=tuple(Choice(str(n), {"splat.iterations": n}) for n in (100, 200, 400, 800, 1600)),
+    choices=tuple(
+        Choice(str(n), {"splat.iterations": n})
+        for n in around(SplatSettings().iterations, 0.125, 0.25, 0.5, 1, 2)
+    ),
     error=ERROR,
     why="Held-out error falls slowly after the default, while time goes on growing in proportion.",
     prepare=_prepare_fit(),
@@ -81,7 +84,8 @@ ITERATIONS = Knob(
 GAUSSIANS = Knob(
     name="number of Gaussians",
     choices=tuple(
-        Choice(f"{n:,}", {"splat.max_gaussians": n}) for n in (1500, 3000, 6000, 12_000, 24_000)
+        Choice(f"{n:,}", {"splat.max_gaussians": n})
+        for n in around(SplatSettings().max_gaussians, 1 / 16, 0.125, 0.25, 0.5, 1)
     ),
     error=ERROR,
     why="Error still falls at the default, which is where a small capture takes about a minute; "
@@ -193,7 +197,10 @@ def _fit_lights(prepared: _Lights, choice: Choice, repeat: int) -> Work:
 
 LIGHT_STEPS = Knob(
     name="iterations of light on frozen geometry",
-    choices=tuple(Choice(str(n), {"relight.frozen_iterations": n}) for n in (50, 200, 400, 1000)),
+    choices=tuple(
+        Choice(str(n), {"relight.frozen_iterations": n})
+        for n in around(RelightSettings().frozen_iterations, 0.25, 0.5, 1, 2)
+    ),
     error="RMS error of single lamps in held-out views, display 0..1",
     why="Once geometry is frozen the lights settle quickly; the default is past the bend.",
     prepare=_prepare_lights(joint_iterations=100),
@@ -203,7 +210,7 @@ LIGHT_STEPS = Knob(
 CACHE = Knob(
     name="cached blending weights",
     choices=(
-        Choice("cached", {"relight.max_baked_mb": 4096}),
+        Choice("cached", {"relight.max_baked_mb": RelightSettings().max_baked_mb}),
         Choice("rasterized every time", {"relight.max_baked_mb": 0}),
     ),
     error="RMS error of single lamps in held-out views, display 0..1",
