@@ -81,7 +81,7 @@ def _setting(params: ProjectSettings, path: str) -> Any:
     return value
 
 
-def around(default: int, *factors: float) -> tuple[int, ...]:
+def around(default: int, *factors: int | float) -> tuple[int, ...]:
     """Whole multiples of a default, so that a sweep follows it when it moves."""
     return tuple(max(1, round(default * factor)) for factor in factors)
 
