@@ -61,6 +61,8 @@ class Sweep:
 def measure(knob: Knob, bench: Bench, repeats: int, *, quiet: bool = False) -> Sweep:
     """Run every choice `repeats` times, interleaved, so that a drift of the machine hits all."""
     prepared = knob.prepare(bench)
+    # The first run of all pays for imports, kernels and caches: it is not counted.
+    knob.run(prepared, knob.choices[0], 0)
     works: dict[str, list[Work]] = {choice.label: [] for choice in knob.choices}
     total = repeats * len(knob.choices)
     with progress(f"tradeoff {knob.name}", total, "runs", quiet=quiet) as bar:

@@ -62,7 +62,7 @@ def test_a_difference_within_the_spread_beats_nothing(seconds: float, error: flo
     assert dominating(close) == []
 
 
-def test_measurements_take_turns() -> None:
+def test_measurements_take_turns_after_a_run_that_does_not_count() -> None:
     order: list[str] = []
 
     def run(prepared: str, choice: Choice, repeat: int) -> Work:
@@ -77,7 +77,7 @@ def test_measurements_take_turns() -> None:
     knob = Knob("k", choices, "error", "why", lambda bench: "ready", run)
     bench = Bench(Path("none"), Path("none"), ProjectSettings(), "demo")
     measured = measure(knob, bench, 2, quiet=True)
-    assert order == ["x0", "y0", "x1", "y1"]
+    assert order[1:] == ["x0", "y0", "x1", "y1"]
     assert measured.default == "x"
     assert [len(p.works) for p in measured.points] == [2, 2]
 
