@@ -19,7 +19,7 @@ def prefect_server(tmp_path_factory):
     """A throw-away Prefect database, so that no test touches a user's."""
     from prefect.testing.utilities import prefect_test_harness
 
-    with prefect_test_harness(server_startup_timeout=120):
+    with prefect_test_harness(server_startup_timeout=600):
         yield
 
 
