@@ -82,13 +82,20 @@ def smaller(crop: LitCrop, side_px: int) -> LitCrop:
         camera.resized(size[1], size[0]),
         _averaged(crop.ambient[None], size)[0],
         _averaged(crop.lights, size),
-        _averaged(crop.masks[..., None].astype(np.float32), size)[..., 0] > 0.25,
+        _smaller_masks(crop.masks, size),
         crop.on,
         _picked(crop.depth_m, size),
         _picked(crop.normal, size),
         crop.kinds,
         crop.exposure,
     )
+
+
+def _smaller_masks(masks: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Pixels that a mask covers by a quarter; of a smaller lamp, those that it covers most."""
+    coverage = _averaged(masks[..., None].astype(np.float32), size)[..., 0]
+    peak = coverage.max(axis=(1, 2), keepdims=True, initial=0)
+    return (coverage >= np.minimum(0.25, peak)) & (coverage > 0)
 
 
 def _averaged(images: np.ndarray, size: tuple[int, int]) -> np.ndarray:
