@@ -29,6 +29,8 @@ def environment() -> dict[str, str]:
 def stale_stages(root: Path) -> dict[str, list[str]]:
     """Stage → why DVC would run it, one phrase each. Stages that are up to date are not in it."""
     done = _dvc(root, "status", "--json")
+    if BUSY in done.stderr:
+        raise LuxError(f"another run is at work in {root}; wait for it to end.")
     if done.returncode != 0:
         raise LuxError(f"dvc status failed: {_last_line(done.stderr)}")
     status = json.loads(done.stdout or "{}")
