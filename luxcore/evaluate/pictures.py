@@ -10,7 +10,7 @@ from jaxtyping import Float
 from luxcore.evaluate.cases import LampCase
 from luxcore.evaluate.single import decomposed, lamp_of
 from luxcore.light.agx import agx
-from luxcore.metrics.rescale import channel_scale
+from luxcore.metrics.score import shown_scale
 from luxcore.models.interface import Decomposer
 
 MAX_ROWS = 8
@@ -29,7 +29,7 @@ def _row(case: LampCase, decomposer: Decomposer) -> np.ndarray:
 
     def predicted(geometry: bool) -> np.ndarray:
         light = lamp_of(decomposed(case, decomposer, geometry=geometry), case.lamp)
-        return agx(light * channel_scale(light, case.truth).astype(np.float32) * exposure)
+        return agx(light * shown_scale(light, case.truth, case.crop.exposure) * exposure)
 
     mask = np.repeat(case.crop.masks[case.lamp][..., None], 3, axis=2).astype(np.float32)
     photo = agx(case.crop.image_linear * exposure)

@@ -28,9 +28,7 @@ def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) ->
     """
     predicted = np.nan_to_num(np.asarray(predicted_linear, np.float32), posinf=0.0, neginf=0.0)
     truth = np.asarray(truth_linear, np.float32)
-    shown = truth.max(axis=-1) * exposure < LINEAR_CEILING
-    scale = channel_scale(predicted[shown], truth[shown]) if shown.any() else np.ones(3)
-    scaled = predicted * scale.astype(np.float32)
+    scaled = predicted * shown_scale(predicted, truth, exposure)
     picture, plain, target = (_display(i, exposure) for i in (scaled, predicted, truth))
     return {
         "psnr": psnr(picture, target),
@@ -40,6 +38,13 @@ def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) ->
         "ssim_unscaled": ssim(plain, target),
         "log_rmse": log_rmse(scaled * exposure, truth * exposure),
     }
+
+
+def shown_scale(predicted: Image, truth: Image, exposure: float) -> Float[np.ndarray, " 3"]:
+    """The channel-wise scale, fitted where the true picture AgX(exposure · truth) is not white."""
+    shown = truth.max(axis=-1) * exposure < LINEAR_CEILING
+    scale = channel_scale(predicted[shown], truth[shown]) if shown.any() else np.ones(3)
+    return scale.astype(np.float32)
 
 
 def score_display(shown: Image, target: Image) -> dict:

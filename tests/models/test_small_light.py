@@ -134,7 +134,7 @@ def test_enlarged_fractions_sum_to_one_and_follow_the_photos_edge() -> None:
     lit = torch.nn.functional.interpolate((photo > 1)[None].float(), (32, 32), mode="area")[0]
     fraction = torch.stack([1 - 0.9 * lit, 0.9 * lit])
     fields = LightFields(fraction, torch.zeros(1, 3, 32, 32), torch.zeros(1, 3, 32, 32))
-    full = fields_at_full_size(fields, small, photo)
+    full = fields_at_full_size(fields, small, photo, torch.tensor([True]))
     torch.testing.assert_close(full.fraction.sum(0), torch.ones(3, 128, 128))
     step = full.fraction[1, 0, 64, 67] - full.fraction[1, 0, 64, 66]
     plain = torch.nn.functional.interpolate(fraction, (128, 128), mode="bilinear")[1, 0, 64]

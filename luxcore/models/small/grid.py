@@ -10,7 +10,7 @@ from torch import Tensor
 
 from luxcore.models.interface import Geometry
 from luxcore.models.small.heads import LightFields
-from luxcore.models.small.levels import PHOTO_MAX
+from luxcore.models.small.levels import CLIPPED, PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
 
@@ -68,7 +68,10 @@ def geometry_to_grid(geometry: Geometry | None, size: tuple[int, int]) -> Surfac
 
 
 def fields_at_full_size(
-    fields: LightFields, photo_small: Float[Tensor, "3 y x"], photo: Float[Tensor, "3 h w"]
+    fields: LightFields,
+    photo_small: Float[Tensor, "3 y x"],
+    photo: Float[Tensor, "3 h w"],
+    on: Bool[Tensor, " k"],
 ) -> LightFields:
     """Light fields of the grid at the photo's size, with edges where the photo has them.
 
@@ -78,11 +81,16 @@ def fields_at_full_size(
     if photo_small.shape == photo.shape:
         return fields
     guide_small, guide = _guide(photo_small), _guide(photo)
+    height, width = photo.shape[1:]
     fraction = _guided(fields.fraction, guide_small, guide).clamp_min(0)
+    nothing = fields.log_ratio.new_zeros(1, 1, 1, 1).expand(len(on), 3, height, width)
+    # What no pixel or lamp asks for is not enlarged: for a large photo that is most of the work.
+    unlit = not bool(on.all())
+    glowing = bool(on.any()) and bool((photo.amax(0) > CLIPPED).any())
     return LightFields(
         fraction / fraction.sum(0, keepdim=True).clamp_min(1e-6),
-        _guided(fields.log_ratio, guide_small, guide),
-        _guided(fields.log_boost, guide_small, guide).clamp_min(0),
+        _guided(fields.log_ratio, guide_small, guide) if unlit else nothing,
+        _enlarged(fields.log_boost, (height, width)) if glowing else nothing,
     )
 
 

@@ -83,7 +83,7 @@ def finish(
     own light stays. Scales are 1 for lamps that are on: `olat` is then the lamp's share itself.
     """
     photo = chw(image_linear).clamp_min(0)
-    fields = fields_at_full_size(fields, photo_small, photo)
+    fields = fields_at_full_size(fields, photo_small, photo, on)
     lights, ambient = lamp_light(fields, photo, on), fields.fraction[0] * photo
     covered = torch.from_numpy(masks)
     lights, ambient = keep_out_of_emitters(lights, ambient, emitter_masks(photo, covered), on)
