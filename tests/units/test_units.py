@@ -30,7 +30,9 @@ def contents(folders: dict[str, Path]) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    "executor", [ProcessExecutor(1), ProcessExecutor(2), DaskExecutor(None, 2)], ids=str
+    "executor",
+    [ProcessExecutor(1), ProcessExecutor(2), DaskExecutor(None, 2)],
+    ids=["one process", "two processes", "dask"],
 )
 def test_every_executor_gives_the_bytes_of_the_serial_one(tmp_path, executor):
     units = units_of("draw", range(6))
