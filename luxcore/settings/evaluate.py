@@ -13,11 +13,11 @@ class EvaluateSettings(Settings):
     backend: str = Field("small", description="single-view backend that is scored")
     mv_backend: str = Field("small", description="multi-view backend that is scored")
     cases: int = Field(
-        12, ge=1, le=10_000, description="(room, lamp) cases with the lamp on, and again off"
+        6, ge=1, le=10_000, description="(room, lamp) cases with the lamp on, and again off"
     )
     size_px: int = Field(128, ge=32, le=1024, description="side of a case's photo")
     groups: int = Field(
-        2, ge=0, le=10_000, description="groups of views cut from the test rooms' panoramas"
+        1, ge=0, le=10_000, description="groups of views cut from the test rooms' panoramas"
     )
     views_per_group: int = Field(4, ge=2, le=15, description="views of such a group")
     capture_views: int = Field(
