@@ -78,6 +78,9 @@ def _state(repo: Any, stage: Stage, upstream: list[str]) -> tuple[str, str]:
     try:
         with repo.lock:
             entry.save_deps()
+            for out in entry.outs:
+                # Else the outputs of the last run, still at hand, are taken for those of the next.
+                out.hash_info = type(out.hash_info)()
             repo.stage_cache.restore(entry, dry=True)
     except RunCacheNotFoundError:
         return "stale", "; ".join(reasons)
