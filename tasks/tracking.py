@@ -80,6 +80,7 @@ def _flat_params(context: StageContext) -> dict[str, Any]:
 def _log_pictures(client: Any, run_id: str, context: StageContext) -> None:
     for name, picture in context.pictures.items():
         if isinstance(picture, Path):
-            client.log_artifact(run_id, str(picture), "pictures")
+            # A folder per name: files of two captures may be called the same.
+            client.log_artifact(run_id, str(picture), f"pictures/{name}")
         else:
             client.log_image(run_id, picture.clip(0, 1), f"pictures/{name}.png")
