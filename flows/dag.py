@@ -137,7 +137,7 @@ STAGES: tuple[Stage, ...] = (
             "relight",
             "evaluate",
         ),
-        code=("luxcore/report", "luxcore/explorer", "luxcore/light"),
+        code=("luxcore/report", "luxcore/explorer", "luxcore/light", "luxcore/evaluate/table.py"),
     ),
 )
 

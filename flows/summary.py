@@ -7,6 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 from flows.plan import StagePlan
+from luxcore.evaluate.table import headlines
 
 
 def plan_table(plans: list[StagePlan]) -> str:
@@ -26,11 +27,11 @@ def plan_table(plans: list[StagePlan]) -> str:
 
 
 def metrics_table(root: Path) -> str:
-    """The evaluation's metrics, one row each."""
+    """The evaluation's headline metrics, one row each; the report has the whole tables."""
     path = root / "artifacts" / "metrics" / "evaluate.json"
     if not path.is_file():
         return "no evaluation yet."
-    metrics = json.loads(path.read_text())
+    metrics = headlines(json.loads(path.read_text()))
     return _table(["metric", "value"], [[name, f"{value:.4g}"] for name, value in metrics.items()])
 
 

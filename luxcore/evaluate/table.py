@@ -78,6 +78,12 @@ def flat_metrics(prefix: str, rows: Sequence[Row]) -> dict[str, float]:
     }
 
 
+def headlines(metrics: Mapping[str, float]) -> dict[str, float]:
+    """The metrics worth a glance: PSNR of each row, and what no table holds."""
+    beside = tuple(f"_{column}" for column in COLUMNS if column != "psnr")
+    return {name: value for name, value in metrics.items() if not name.endswith(beside)}
+
+
 def _words(text: str) -> list[str]:
     return "".join(c if c.isalnum() else " " for c in text.lower()).split()
 

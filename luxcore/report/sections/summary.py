@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from luxcore.evaluate.table import headlines
 from luxcore.report.content import Section, Strip, Table, number
 from luxcore.report.gallery import Gallery
 from luxcore.report.sources import read_json
@@ -15,7 +16,7 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     blocks: list[Strip | Table] = []
     metrics = read_json(artifacts / "evaluate" / "metrics.json") or {}
     if metrics:
-        rows = tuple((name, number(value)) for name, value in sorted(metrics.items()))
+        rows = tuple((name, number(value)) for name, value in sorted(headlines(metrics).items()))
         blocks.append(Table("Scores", "evaluate", ("score", "value"), rows))
     timings = {
         path.stem: read_json(path) for path in sorted((artifacts / "timings").glob("*.json"))
