@@ -12,6 +12,7 @@ from torch import Tensor
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import atomic_file
+from luxcore.files.tensors import settle_header
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
 from luxcore.models.small.network import (
     MV_OUTPUTS,
@@ -44,6 +45,7 @@ def save_weights(path: Path, kind: str, shape: NetworkShape, weights: Mapping[st
     tensors = {name: t.detach().half().contiguous() for name, t in weights.items()}
     with atomic_file(Path(path)) as temporary:
         save_file(tensors, str(temporary), metadata)
+        settle_header(temporary)
 
 
 def load_network(path: Path, kind: str) -> LampNet:
