@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ import urllib.request
 from pathlib import Path
 
 from luxcore.errors import LuxError
+from luxcore.ports import free_port
 from tasks.process import die_with_parent
 
 HOST = "127.0.0.1"
@@ -57,7 +57,7 @@ def run_in_worktree(root: Path, worktree: Path, stages: list[str] | None) -> str
 
 def start_server(root: Path) -> subprocess.Popen[bytes]:
     """A Prefect server on loopback, named to this process through `PREFECT_API_URL`."""
-    port = free_port()
+    port = free_port(HOST)
     os.environ.setdefault("PREFECT_HOME", str(root / ".lux" / "prefect"))
     command = [sys.executable, "-m", "prefect", "server", "start", "--host", HOST]
     log = root / ".lux" / "prefect-server.log"
@@ -73,13 +73,6 @@ def start_server(root: Path) -> subprocess.Popen[bytes]:
     _wait_for(f"{url}/health", server, log)
     os.environ["PREFECT_API_URL"] = url
     return server
-
-
-def free_port() -> int:
-    """A TCP port on loopback that nothing listens on."""
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
 
 
 def _wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:

@@ -13,7 +13,7 @@ from prefect.runtime import flow_run as current_run
 from prefect.states import Crashed, State
 
 from flows.schedule import run_in_worktree
-from luxcore.errors import LuxError
+from luxcore.errors import BusyError
 from tasks.process import stage_lock
 
 NAME = "luxremix-scheduled"
@@ -28,9 +28,7 @@ def scheduled_run(root: str, worktree: str, stages: list[str] | None = None) -> 
             for name in bury_dead_runs(str(current_run.id)):
                 logger.warning("run %s had died without a word; marked as crashed", name)
             outcome = run_in_worktree(Path(root), Path(worktree), stages)
-    except LuxError as error:
-        if "already running" not in str(error):
-            raise
+    except BusyError as error:
         outcome = f"the previous build is still going, this one ends: {error}"
     logger.info(outcome)
     return outcome

@@ -21,5 +21,9 @@ class DeviceError(LuxError):
     """No usable OpenCL platform, a kernel that does not build, or a device that was lost."""
 
 
+class BusyError(LuxError):
+    """Another process is at the same work."""
+
+
 class DivergedError(LuxError):
     """An optimization or a model produced numbers that are not finite."""

@@ -1,4 +1,4 @@
-"""Listening on a port that may be taken."""
+"""Finding a port to listen on, and listening on one that may be taken."""
 
 from __future__ import annotations
 
@@ -17,3 +17,10 @@ def check_port(host: str, port: int) -> None:
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise InputError(f"port {port} on {host} cannot be used: {reason}.") from error
+
+
+def free_port(host: str = "127.0.0.1") -> int:
+    """A TCP port that nothing listens on now."""
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from luxcore.errors import LuxError
+from luxcore.errors import BusyError, LuxError
 
 _PR_SET_PDEATHSIG = 1
 
@@ -33,7 +33,7 @@ def stage_lock(root: Path, name: str) -> Iterator[None]:
         except OSError as error:
             stream.seek(0)
             holder = stream.read().strip() or "another process"
-            raise LuxError(f"stage {name} is already running in process {holder}.") from error
+            raise BusyError(f"stage {name} is already running in process {holder}.") from error
         stream.truncate(0)
         stream.write(str(os.getpid()))
         stream.flush()

@@ -11,18 +11,13 @@ import pytest
 from luxcore import dashboards as module
 from luxcore.dashboards import Dashboard, dashboards, serve_dashboards
 from luxcore.errors import InputError, LuxError
+from luxcore.ports import free_port
 
 SERVER = """
 import http.server, sys
 handler = http.server.SimpleHTTPRequestHandler
 http.server.test(handler, port=int(sys.argv[1]), bind="127.0.0.1")
 """
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def stand_in(port: int, program: str = SERVER) -> Dashboard:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from viewer_scene import room_scene, save_room
 
 from luxcore.errors import InputError
 from luxcore.light.agx import agx
+from luxcore.ports import free_port
 from luxcore.splats.relighting import LampSetting, mixing_weights
 from luxcore.viewer.app import Viewer
 from luxcore.viewer.lighting import original_lighting
@@ -26,12 +26,6 @@ pytestmark = pytest.mark.browser
 
 # Rows are ambient, desk, wall, floor; each has the checkboxes "on" and "solo".
 AMBIENT_SOLO, DESK_ON = 1, 2
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="module")
