@@ -11,6 +11,8 @@ import os
 import resource
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,8 @@ def main() -> None:
     """Serve requests until the parent goes away."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    import bpy
+    with _one_cpu():
+        import bpy
 
     bpy.context.preferences.filepaths.use_scripts_auto_execute = False
     from luxcore.render.blender.job import RenderJob
@@ -28,6 +31,21 @@ def main() -> None:
     for line in sys.stdin:
         answers.write(json.dumps(_answer(job, json.loads(line))) + "\n")
         answers.flush()
+
+
+@contextmanager
+def _one_cpu() -> Iterator[None]:
+    """Load under an affinity of one CPU, then give all of them back.
+
+    TBB sizes its pool by the affinity it finds when it is loaded. Left alone, its idle workers
+    spin in sched_yield beside the one thread that renders, which doubles the CPU time of a room.
+    """
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def _answer(job: Any, request: dict[str, Any]) -> dict[str, Any]:
