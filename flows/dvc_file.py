@@ -24,7 +24,8 @@ def _stage_entry(stage: Stage) -> dict[str, Any]:
     inputs = [BY_NAME[name].folder for name in stage.needs]
     return {
         "desc": stage.does,
-        "cmd": f"python -m tasks {stage.name}",
+        # exec: dash would stay between dvc and the stage, which then would outlive a stopped dvc.
+        "cmd": f"exec python -m tasks {stage.name}",
         "deps": sorted({*code, *stage.code, *COMMON_CODE, *inputs}),
         "params": sorted({"seed", stage.name, *stage.settings}),
         "outs": [stage.folder],

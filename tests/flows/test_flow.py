@@ -70,8 +70,9 @@ def test_reasons_and_outcomes_are_said_and_the_lock_is_copied_first(tmp_path):
     assert reproduce(root, "rooms") == "unchanged"
 
 
-def test_a_stage_dies_with_dvc(tmp_path, project_root):
-    """SIGTERM to `dvc repro` must not leave a stage that goes on writing."""
+@pytest.mark.parametrize("shell", ["/bin/sh", "/bin/bash"])
+def test_a_stage_dies_with_dvc(tmp_path, project_root, shell):
+    """SIGTERM to `dvc repro` must not leave a stage that goes on writing, whatever the shell."""
     root = make_project(tmp_path / "p")
     alive = root / "alive"
     (root / "first.py").write_text(
@@ -82,7 +83,11 @@ def test_a_stage_dies_with_dvc(tmp_path, project_root):
     )
     command = [sys.executable, "-m", "dvc", "repro", "rooms"]
     process = subprocess.Popen(
-        command, cwd=root, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        command,
+        cwd=root,
+        env={**environment(), "SHELL": shell},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
     assert _eventually(alive.exists)
     process.terminate()

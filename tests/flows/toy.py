@@ -14,12 +14,12 @@ TOY_STAGES = (Stage("rooms", "writes a number"), Stage("render", "doubles it", n
 DVC_YAML = """\
 stages:
   rooms:
-    cmd: python first.py
+    cmd: exec python first.py
     deps: [first.py]
     params: [seed]
     outs: [artifacts/rooms]
   render:
-    cmd: python second.py
+    cmd: exec python second.py
     deps: [second.py, artifacts/rooms]
     outs: [artifacts/render]
 """
