@@ -24,11 +24,10 @@ class Limits:
 
 def run_guarded(
     function: str, out_dir: Path, arguments: dict[str, Any], limits: Limits | None
-) -> None:
-    """Call "module:callable"(out_dir, **arguments), under `limits` where there are any."""
+) -> Any:
+    """What "module:callable"(out_dir, **arguments) returns, run under `limits` where any are."""
     if limits is None:
-        _call(function, out_dir, arguments)
-        return
+        return _call(function, out_dir, arguments)
     context = multiprocessing.get_context("spawn")
     receive, send = context.Pipe(duplex=False)
     child = context.Process(target=_child, args=(send, function, out_dir, arguments, limits))
@@ -37,7 +36,7 @@ def run_guarded(
     try:
         if not receive.poll(limits.timeout_s):
             raise LuxError(f"took longer than {limits.timeout_s:g} s and was stopped.")
-        problem = receive.recv()
+        problem, returned = receive.recv()
     except EOFError as error:
         child.join()
         raise LuxError(f"its process ended with code {child.exitcode}.") from error
@@ -46,6 +45,12 @@ def run_guarded(
         child.join()
     if problem is not None:
         raise LuxError(problem)
+    return returned
+
+
+def sentence(error: BaseException) -> str:
+    """What a failure is called in the quarantine: ours are sentences, others have a name too."""
+    return str(error) if isinstance(error, LuxError) else f"{type(error).__name__}: {error}"
 
 
 def _child(
@@ -53,18 +58,16 @@ def _child(
 ) -> None:
     if limits.memory_mb is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limits.memory_mb << 20,) * 2)
-    problem = None
+    problem = returned = None
     try:
-        _call(function, out_dir, arguments)
+        returned = _call(function, out_dir, arguments)
     except MemoryError:
         problem = f"needed more than {limits.memory_mb} MB."
-    except LuxError as error:
-        problem = str(error)
     except Exception as error:
-        problem = f"{type(error).__name__}: {error}"
-    send.send(problem)
+        problem = sentence(error)
+    send.send((problem, returned))
 
 
-def _call(function: str, out_dir: Path, arguments: dict[str, Any]) -> None:
+def _call(function: str, out_dir: Path, arguments: dict[str, Any]) -> Any:
     module, name = function.split(":")
-    getattr(importlib.import_module(module), name)(out_dir, **arguments)
+    return getattr(importlib.import_module(module), name)(out_dir, **arguments)

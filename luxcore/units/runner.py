@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,18 +12,32 @@ from typing import Any
 from luxcore.errors import InputError, LuxError
 from luxcore.progress import progress
 from luxcore.units.executor import Executor, SerialExecutor
-from luxcore.units.guard import Limits, run_guarded
+from luxcore.units.guard import Limits, run_guarded, sentence
 from luxcore.units.store import UnitStore
+
+SECONDS = "seconds.jsonl"
+"""Beside the units, never inside of one: equal units have equal bytes, not equal times."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One keyed piece of work: `function` "module:name" is called as `f(out_dir, **arguments)`."""
+    """One keyed piece of work: `function` "module:name" is called as `f(out_dir, **arguments)`.
+
+    What it returns is None or CPU seconds by step, which are kept apart from its files.
+    """
 
     name: str
     function: str
     arguments: dict[str, Any]
     key: str
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a unit ended: why it failed, or None; what it cost, where its function says so."""
+
+    problem: str | None
+    seconds: dict[str, float] | None = None
 
 
 @dataclass
@@ -48,7 +63,9 @@ def run_units(
     rows = [(str(store.root), u.key, u.function, u.arguments, limits) for u in missing]
     with progress(label, len(missing), "units", quiet=not missing) as bar:
         for index, outcome in (executor or SerialExecutor()).run(_compute, rows):
-            _record(result, store, missing[index], outcome)
+            # A worker that died gives an exception instead.
+            ended = outcome if isinstance(outcome, Ended) else Ended(sentence(outcome))
+            _record(result, store, missing[index], ended)
             bar.advance(failed=len(result.failed), reused=result.reused)
     if result.failed:
         _quarantine(store, result.failed)
@@ -61,6 +78,18 @@ def run_units(
 def missing_units(units: Sequence[Unit], store: UnitStore) -> list[Unit]:
     """The units that a run would compute."""
     return [u for u in units if not store.has(u.key)]
+
+
+def read_seconds(store: UnitStore) -> dict[str, dict[str, float]]:
+    """CPU seconds by step of every unit that was computed here, by the unit's key."""
+    path = store.root / SECONDS
+    seconds = {}
+    for line in path.read_text().splitlines() if path.is_file() else ():
+        # A run that was killed may leave half a line.
+        with suppress(ValueError):
+            entry = json.loads(line)
+            seconds[entry["key"]] = entry["seconds"]
+    return seconds
 
 
 def _split(units: Sequence[Unit], store: UnitStore) -> tuple[UnitsResult, list[Unit]]:
@@ -77,24 +106,31 @@ def _split(units: Sequence[Unit], store: UnitStore) -> tuple[UnitsResult, list[U
     return result, missing
 
 
-def _record(result: UnitsResult, store: UnitStore, unit: Unit, outcome: Any) -> None:
-    if outcome is None:
-        result.folders[unit.name] = store.path(unit.key)
-    else:
-        result.failed[unit.name] = str(outcome) or type(outcome).__name__
+def _record(result: UnitsResult, store: UnitStore, unit: Unit, ended: Ended) -> None:
+    if ended.problem is not None:
+        result.failed[unit.name] = ended.problem
+        return
+    result.folders[unit.name] = store.path(unit.key)
+    if ended.seconds is not None:
+        line = {"unit": unit.name, "key": unit.key, "seconds": ended.seconds}
+        with open(store.root / SECONDS, "a", encoding="utf-8") as stream:
+            stream.write(json.dumps(line, sort_keys=True) + "\n")
 
 
 def _compute(
     root: str, key: str, function: str, arguments: dict[str, Any], limits: Limits | None
-) -> str | None:
+) -> Ended:
     """Run one unit in whatever process this is; a reason comes back instead of an exception."""
+    returned: list[Any] = []
+
+    def write(out: Path) -> None:
+        returned.append(run_guarded(function, out, arguments, limits))
+
     try:
-        UnitStore(Path(root)).put(key, lambda out: run_guarded(function, out, arguments, limits))
-    except LuxError as error:
-        return str(error)
+        UnitStore(Path(root)).put(key, write)
     except Exception as error:
-        return f"{type(error).__name__}: {error}"
-    return None
+        return Ended(sentence(error))
+    return Ended(None, returned[0])
 
 
 def _quarantine(store: UnitStore, failed: dict[str, str]) -> None:

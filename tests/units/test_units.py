@@ -11,7 +11,14 @@ from pathlib import Path
 import pytest
 
 from luxcore.errors import InputError, LuxError
-from luxcore.units import Unit, UnitStore, executor_from_environment, run_units, unit_key
+from luxcore.units import (
+    Unit,
+    UnitStore,
+    executor_from_environment,
+    read_seconds,
+    run_units,
+    unit_key,
+)
 from luxcore.units.executor import DaskExecutor, ProcessExecutor, SerialExecutor
 from luxcore.units.guard import Limits
 
@@ -103,6 +110,22 @@ def test_a_killed_run_resumes_with_what_is_missing(tmp_path):
     assert result.reused == kept
     unbroken = run_units(units_of("draw", range(40)), UnitStore(tmp_path / "unbroken"))
     assert contents(result.folders) == contents(unbroken.folders)
+
+
+@pytest.mark.parametrize("limits", [None, Limits(timeout_s=60.0)], ids=["free", "guarded"])
+def test_what_a_unit_cost_is_kept_beside_it_and_never_in_it(tmp_path, limits):
+    units, store = units_of("draw_and_tell", range(2)), UnitStore(tmp_path)
+    assert read_seconds(store) == {}
+    result = run_units(units, store, limits=limits)
+    with open(tmp_path / "seconds.jsonl", "a") as log:
+        log.write('{"key": "half a li')
+    seconds = read_seconds(store)
+    assert {k: v["render"] for k, v in seconds.items()} == {units[0].key: 0.0, units[1].key: 1.0}
+    names = {f.name for folder in result.folders.values() for f in folder.iterdir()}
+    assert names == {"numbers.bin", "manifest.json"}
+    # Units that were found done cost nothing new.
+    assert run_units(units, store).reused == 2
+    assert read_seconds(store) == seconds
 
 
 def test_the_key_follows_code_arguments_and_inputs():
