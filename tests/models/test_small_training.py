@@ -14,7 +14,7 @@ from luxcore.models.small.batches import GroupBatches, SingleBatches
 from luxcore.models.small.fit import FitSettings, fit, schedule
 from luxcore.models.small.heads import light_fields
 from luxcore.models.small.losses import example_loss
-from luxcore.models.small.network import LampNet, NetworkShape
+from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.scores import mean_psnr
 from luxcore.models.small.sketch import SketchRooms
@@ -38,7 +38,13 @@ def tiny(kind: str) -> LampNet:
 def trained(pool: CropPool, settings: FitSettings, checkpoint: Path | None = None) -> dict:
     score = single_cases(pool, 0)
     batches = SingleBatches(pool, 5, photos=2)
-    return fit(tiny("sv"), batches, settings, lambda n: mean_psnr(n, score), checkpoint).weights
+    return fit(
+        tiny("sv"),
+        batches,
+        settings,
+        lambda n: {"psnr_validation": mean_psnr(n, score)},
+        checkpoint,
+    ).weights
 
 
 def test_sketched_rooms_are_the_same_every_time_and_differ_by_number() -> None:
@@ -77,11 +83,11 @@ def test_resume_equals_an_unbroken_run(pool: CropPool, tmp_path: Path) -> None:
     score = single_cases(pool, 0)
     calls: list[int] = []
 
-    def stop_at_second_check(net: LampNet) -> float:
+    def stop_at_second_check(net: UNet) -> dict[str, float]:
         calls.append(1)
         if len(calls) == 2:
             raise StopError
-        return mean_psnr(net, score)
+        return {"psnr_validation": mean_psnr(net, score)}
 
     batches = SingleBatches(pool, 5, photos=2)
     with pytest.raises(StopError):
@@ -123,7 +129,7 @@ def test_training_that_diverges_says_so(pool: CropPool) -> None:
     net = tiny("sv")
     torch.nn.init.constant_(net.head.weight, float("nan"))
     with pytest.raises(DivergedError, match="step 0 is not finite"):
-        fit(net, SingleBatches(pool, 5, photos=1), SETTINGS, lambda _: 0.0)
+        fit(net, SingleBatches(pool, 5, photos=1), SETTINGS, lambda _: {})
 
 
 def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:

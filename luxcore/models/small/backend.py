@@ -8,7 +8,7 @@ from luxcore.errors import InputError
 from luxcore.models.interface import BackendSettings, Decomposer, Harmonizer
 from luxcore.models.small.multi_view import SmallHarmonizer
 from luxcore.models.small.single_view import SmallDecomposer
-from luxcore.models.small.weights import load_network, shipped_weights
+from luxcore.models.small.weights import load_network, shipped_estimator, shipped_weights
 
 LONG_SIDE_PX = 96
 """Long side of the network's grid, as in training; 64 and 128 score the same within 0.3 dB."""
@@ -17,9 +17,11 @@ LONG_SIDE_RANGE = (32, 1024)
 
 
 def open_decomposer(settings: BackendSettings) -> Decomposer:
-    """`sv_weights` is a safetensors file (default: the shipped one); option `long_side_px`."""
+    """`sv_weights` is a safetensors file (default: the shipped one); options `long_side_px` and
+    `estimate` (false leaves the geometry of a lone photo unknown: an ablation)."""
     net = load_network(_path(settings.sv_weights, "sv"), "sv")
-    return SmallDecomposer(net, _long_side(settings))
+    estimator = shipped_estimator() if settings.options.get("estimate", True) else None
+    return SmallDecomposer(net, _long_side(settings), estimator)
 
 
 def open_harmonizer(settings: BackendSettings) -> Harmonizer:
@@ -35,10 +37,10 @@ def _path(weights: str | None, kind: str) -> Path:
 
 
 def _long_side(settings: BackendSettings) -> int:
-    unknown = sorted(set(settings.options) - {"long_side_px", "warp"})
+    unknown = sorted(set(settings.options) - {"long_side_px", "warp", "estimate"})
     if unknown:
         raise InputError(
-            f"the small backend has no option {unknown[0]}; it has long_side_px and warp."
+            f"the small backend has no option {unknown[0]}; it has long_side_px, warp and estimate."
         )
     value = settings.options.get("long_side_px", LONG_SIDE_PX)
     low, high = LONG_SIDE_RANGE

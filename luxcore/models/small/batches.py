@@ -13,7 +13,9 @@ from torch import Tensor
 from luxcore.data.crops import LitCrop
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
+from luxcore.models.small.geometry import estimate_surfaces
 from luxcore.models.small.multiview import KnownLight, TargetView, multiview_features
+from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import CropPool
 
 
@@ -21,14 +23,15 @@ from luxcore.models.small.samples import CropPool
 class SingleBatches:
     """Single photos of `pool`, newly lit each time, half of them mirrored.
 
-    `geometry` is the share of photos that come with depth and normals; the rest teach the network
-    to do without.
+    `geometry` is the share of photos that come with true depth and normals; for the rest
+    `estimator` guesses them, where there is one.
     """
 
     pool: CropPool
     seed: int
     photos: int = 5
     geometry: float = 0.5
+    estimator: UNet | None = None
 
     def batch(self, step: int) -> list[tuple[Tensor, Example]]:
         """`photos` examples with the features of their lamps; photos that show no lamp are passed
@@ -42,7 +45,7 @@ class SingleBatches:
                 flip=bool(rng.random() < 0.5),
             )
             if len(example.on):
-                found.append((_features(example), example))
+                found.append((single_features(example, self.estimator), example))
         return found
 
 
@@ -85,8 +88,12 @@ def group_example(
     return features, replace(example, warped=warped)
 
 
-def _features(example: Example) -> Tensor:
-    return lamp_features(example.photo, example.masks, example.on, example.surfaces)
+def single_features(example: Example, estimator: UNet | None) -> Tensor:
+    """Features of a photo's lamps; geometry that does not come with it is guessed."""
+    surfaces = example.surfaces
+    if surfaces is None and estimator is not None:
+        surfaces = estimate_surfaces(estimator, example.photo)
+    return lamp_features(example.photo, example.masks, example.on, surfaces)
 
 
 def _known_light(view: LitCrop, keep: np.ndarray, rng: Generator | None) -> KnownLight:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -64,7 +64,7 @@ def _flipped(example: Example) -> Example:
     surfaces = example.surfaces
     if surfaces is not None:
         points, normals = surfaces.points.flip(-1) * mirror, surfaces.normals.flip(-1) * mirror
-        surfaces = Surfaces(points, normals)
+        surfaces = replace(surfaces, points=points, normals=normals)
     return Example(
         example.photo.flip(-1),
         example.masks.flip(-1),

@@ -38,7 +38,7 @@ def lamp_features(
     centres, known = _centres(masks, surfaces, lamp_points)
     irradiance = unit_irradiance(masks, surfaces, centres, known)
     shares = lambert_shares(photo, masks, irradiance, on)
-    shared = torch.cat([display_curve(photo) - 0.5, _stops(photo) / 4])
+    shared = photo_features(photo)
     others_on, others_off = _other_masks(masks, on)
     channels = [
         shared.expand(k, -1, -1, -1),
@@ -54,6 +54,11 @@ def lamp_features(
         2 * (1 - shares.sum(0, keepdim=True)).clamp(0, 1).expand(k, -1, -1, -1) - 1,
     ]
     return torch.cat(channels, dim=1)
+
+
+def photo_features(photo: Float[Tensor, "3 h w"]) -> Float[Tensor, "6 h w"]:
+    """The photo on the display curve and in stops, both about zero."""
+    return torch.cat([display_curve(photo) - 0.5, _stops(photo) / 4])
 
 
 def _stops(linear: Tensor) -> Tensor:
@@ -105,7 +110,8 @@ def _centres(
 def _geometry(
     masks: Tensor, surfaces: Surfaces | None, centres: Tensor | None, known: Tensor | None
 ) -> Tensor:
-    """[k 11 h w]: normal, inverse depth, direction to lamp, distance, cosine term, flags."""
+    """[k 11 h w]: normal, inverse depth, direction to lamp, distance, cosine term, whether the
+    lamp's place is known, trust in all of it."""
     k, h, w = masks.shape
     if surfaces is None or centres is None or known is None or not k:
         return masks.new_zeros(k, 11, h, w)
@@ -122,4 +128,4 @@ def _one_geometry(surfaces: Surfaces, centre: Tensor, lamp_known: bool) -> Tenso
         direction, distance, irradiance = lambert_terms(surfaces, centre)
         scalars = [torch.log2(distance) / 2, torch.log2(irradiance + 1e-3) / 4]
         lamp = torch.cat([direction, torch.stack(scalars), torch.ones_like(valid)[None]])
-    return torch.cat([seen, lamp, torch.ones_like(valid)[None]]) * valid
+    return torch.cat([seen, lamp, torch.full_like(valid, surfaces.trust)[None]]) * valid

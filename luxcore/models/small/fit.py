@@ -16,7 +16,7 @@ from luxcore.files.atomic import atomic_file
 from luxcore.models.small.examples import Example
 from luxcore.models.small.heads import light_fields
 from luxcore.models.small.losses import example_loss
-from luxcore.models.small.network import LampNet, channels_last
+from luxcore.models.small.network import UNet, channels_last
 from luxcore.progress import progress
 
 
@@ -24,7 +24,19 @@ from luxcore.progress import progress
 class Batches(Protocol):
     """Examples by step, with the features that the network reads; pure functions of the number."""
 
-    def batch(self, step: int) -> Sequence[tuple[Tensor, Example]]: ...
+    def batch(self, step: int) -> Sequence[tuple[Tensor, Any]]: ...
+
+
+Loss = Callable[[Tensor, Any], Tensor]
+"""Outputs [b, o, h, w] of an example's features, and the example, to a scalar."""
+
+Validate = Callable[[UNet], dict[str, float]]
+"""Scores of a network, by name, on examples that training never sees."""
+
+
+def lamp_loss(outputs: Tensor, example: Example) -> Tensor:
+    """The loss of the lamp networks."""
+    return example_loss(light_fields(outputs, example.on, example.warped), example)
 
 
 @dataclass(frozen=True)
@@ -49,21 +61,22 @@ class FitResult:
 
 
 def fit(
-    net: LampNet,
+    net: UNet,
     batches: Batches,
     settings: FitSettings,
-    validate: Callable[[LampNet], float],
+    validate: Validate,
     checkpoint: Path | None = None,
+    loss: Loss = lamp_loss,
 ) -> FitResult:
     """Train `net` in place. With `checkpoint`, an interrupted call continues to the same bits."""
-    state = _Fit(net, settings, validate)
+    state = _Fit(net, settings, validate, loss)
     if checkpoint is not None and checkpoint.is_file():
         state.load(torch.load(checkpoint, weights_only=True))
     with progress("training", settings.steps, "steps") as bar:
         bar.advance(state.step)
         while state.step < settings.steps:
-            loss = state.advance(batches.batch(state.step))
-            bar.advance(loss=f"{loss:.4f}")
+            smooth = state.advance(batches.batch(state.step))
+            bar.advance(loss=f"{smooth:.4f}")
             if state.step % settings.check_every == 0 or state.step == settings.steps:
                 state.check()
                 if checkpoint is not None:
@@ -73,8 +86,13 @@ def fit(
 
 class _Fit:
     def __init__(
-        self, net: LampNet, settings: FitSettings, validate: Callable[[LampNet], float]
+        self,
+        net: UNet,
+        settings: FitSettings,
+        validate: Validate,
+        loss: Loss,
     ) -> None:
+        self.loss_of = loss
         self.net = channels_last(net).train()
         self.settings, self.validate = settings, validate
         self.optimizer = torch.optim.AdamW(net.parameters(), settings.rate, weight_decay=0.02)
@@ -82,7 +100,7 @@ class _Fit:
         self.step, self.lamps, self.loss = 0, 0, math.nan
         self.curve: list[dict[str, float]] = []
 
-    def advance(self, batch: Sequence[tuple[Tensor, Example]]) -> float:
+    def advance(self, batch: Sequence[tuple[Tensor, Any]]) -> float:
         """One step on all lamps of a batch of photos."""
         for group in self.optimizer.param_groups:
             group["lr"] = self.settings.rate * schedule(self.step, self.settings)
@@ -90,10 +108,7 @@ class _Fit:
         with torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bf16):
             outputs = self.net(features)
         parts = outputs.float().split([len(f) for f, _ in batch])
-        losses = [
-            example_loss(light_fields(part, example.on, example.warped), example)
-            for part, (_, example) in zip(parts, batch, strict=True)
-        ]
+        losses = [self.loss_of(p, example) for p, (_, example) in zip(parts, batch, strict=True)]
         loss = torch.stack(losses).mean()
         if not bool(torch.isfinite(loss)):
             raise DivergedError(f"training diverged: the loss of step {self.step} is not finite.")
@@ -109,14 +124,14 @@ class _Fit:
 
     def check(self) -> None:
         """Score the averaged weights on photos that training never sees."""
-        shape, own = self.net.shape, self.net.training
-        averaged = channels_last(LampNet(shape))
+        own = self.net.training
+        averaged = channels_last(type(self.net)(self.net.shape))
         averaged.load_state_dict(self.ema)
         row = {
             "step": float(self.step),
             "lamps_seen": float(self.lamps),
             "loss": self.loss,
-            "psnr_validation": self.validate(averaged.eval()),
+            **self.validate(averaged.eval()),
         }
         self.curve.append(row)
         self.net.train(own)

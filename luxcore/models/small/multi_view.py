@@ -21,7 +21,7 @@ from luxcore.models.small.grid import (
     to_grid,
 )
 from luxcore.models.small.multiview import KnownLight, TargetView, multiview_features
-from luxcore.models.small.network import LampNet
+from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import chw
 from luxcore.models.small.single_view import finish, run_network, with_unseen
 from luxcore.models.small.surfaces import Surfaces
@@ -35,7 +35,7 @@ class SmallHarmonizer:
     are.
     """
 
-    net: LampNet
+    net: UNet
     long_side_px: int
     warp: bool = True
     name: str = "small"

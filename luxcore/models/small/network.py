@@ -1,4 +1,4 @@
-"""A pixel-unshuffle U-Net that looks at one lamp of one photo and says how its light falls.
+"""A pixel-unshuffle U-Net; `LampNet` looks at one lamp of one photo and says how its light falls.
 
 The weights are shared by all lamps: K lamps are a batch of K. What the four heads mean, and how K
 answers become one decomposition that adds up, is in `heads.py`.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import torch
 import torch.nn.functional as fn
@@ -43,7 +44,7 @@ class NetworkShape:
         return {**asdict(self), "widths": list(self.widths)}
 
 
-class LampNet(nn.Module):
+class UNet(nn.Module):
     """[b, inputs, h, w] → [b, outputs, h, w]; h and w multiples of `shape.stride`."""
 
     def __init__(self, shape: NetworkShape) -> None:
@@ -70,7 +71,14 @@ class LampNet(nn.Module):
         x = self.middle(x)
         for block, skip in zip(self.up, skips[-2::-1], strict=True):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
-        outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+        return fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+
+
+class LampNet(UNet):
+    """Features of one lamp to its four heads: corrections of what the Lambert fit guesses."""
+
+    def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o h w"]:
+        outputs = super().forward(features)
         guess = torch.cat([prior_logits(features), prior_log_ratio(features)], dim=1)
         return torch.cat([outputs[:, :9] + guess, outputs[:, 9:]], dim=1)
 
@@ -127,6 +135,9 @@ class Attention(nn.Module):
         return x + self.out(mixed.transpose(-1, -2).reshape(b, c, h, w))
 
 
-def channels_last(net: LampNet) -> LampNet:
+Net = TypeVar("Net", bound=nn.Module)
+
+
+def channels_last(net: Net) -> Net:
     """The same weights laid out as the CPU's convolutions like them: twice as fast."""
     return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -12,13 +12,13 @@ from torch import Tensor
 from luxcore.light.agx import agx
 from luxcore.models.small.examples import Example
 from luxcore.models.small.heads import lamp_light, light_fields
-from luxcore.models.small.network import LampNet
+from luxcore.models.small.network import UNet
 
 ROWS = 6
 
 
 def validation_sheet(
-    net: LampNet, cases: Sequence[tuple[Tensor, Example]]
+    net: UNet, cases: Sequence[tuple[Tensor, Example]]
 ) -> Float[np.ndarray, "h w 3"]:
     """One row per photo: photo, mask, predicted light, true light of its first lamp; 0..1."""
     rows = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import torch
@@ -11,17 +12,25 @@ from luxcore.light.agx import agx
 from luxcore.models.small.examples import Example
 from luxcore.models.small.heads import lamp_light, light_fields
 from luxcore.models.small.levels import PHOTO_MAX
-from luxcore.models.small.network import LampNet
+from luxcore.models.small.network import UNet
 
 
-def mean_psnr(net: LampNet, cases: Sequence[tuple[Tensor, Example]]) -> float:
-    """Mean PSNR in dB of burning lamps' OLATs, AgX after a least-squares scale per channel."""
+def lamp_scores(net: UNet, cases: Sequence[tuple[Tensor, Example]]) -> dict[str, float]:
+    """What the curve of a training shows: burning lamps, and lamps that are off in the photo."""
+    scores = {"psnr_validation": mean_psnr(net, cases), "psnr_off": mean_psnr(net, cases, on=False)}
+    return {name: value for name, value in scores.items() if math.isfinite(value)}
+
+
+def mean_psnr(net: UNet, cases: Sequence[tuple[Tensor, Example]], *, on: bool = True) -> float:
+    """Mean PSNR in dB of OLATs, AgX after a least-squares scale per channel, of the lamps that
+    burn in the photo or of those that do not; NaN when there are none."""
     scores: list[Tensor] = []
     with torch.no_grad():
         for features, example in cases:
             fields = light_fields(net(features), example.on, example.warped)
-            light = lamp_light(fields, example.photo, example.on)[example.on]
-            scores += [_psnr(p, t) for p, t in zip(light, example.lights[example.on], strict=True)]
+            asked = example.on == on
+            light = lamp_light(fields, example.photo, example.on)[asked]
+            scores += [_psnr(p, t) for p, t in zip(light, example.lights[asked], strict=True)]
     return float(torch.stack(scores).mean()) if scores else float("nan")
 
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from luxcore.models.interface import Decomposition, Geometry
 from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
 from luxcore.models.small.features import lamp_features
+from luxcore.models.small.geometry import estimate_surfaces
 from luxcore.models.small.grid import (
     fields_at_full_size,
     geometry_to_grid,
@@ -20,16 +21,20 @@ from luxcore.models.small.grid import (
     photo_to_grid,
 )
 from luxcore.models.small.heads import LightFields, WarpedLight, lamp_light, light_fields
-from luxcore.models.small.network import SV_OUTPUTS, LampNet
+from luxcore.models.small.network import SV_OUTPUTS, UNet
 from luxcore.models.small.samples import chw
 
 
 @dataclass(frozen=True)
 class SmallDecomposer:
-    """Light fractions at `long_side_px`, carried to the photo's own size. Deterministic."""
+    """Light fractions at `long_side_px`, carried to the photo's own size. Deterministic.
 
-    net: LampNet
+    `estimator` guesses the geometry of photos that come without; None leaves it unknown.
+    """
+
+    net: UNet
     long_side_px: int
+    estimator: UNet | None = None
     name: str = "small"
 
     def decompose(
@@ -49,15 +54,16 @@ class SmallDecomposer:
         size = grid_size(height, width, self.long_side_px, self.net.shape.stride)
         small = photo_to_grid(image_linear, size)
         burning = torch.from_numpy(on)
-        features = lamp_features(
-            small, masks_to_grid(masks, size), burning, geometry_to_grid(geometry, size)
-        )
+        surfaces = geometry_to_grid(geometry, size)
+        if surfaces is None and self.estimator is not None:
+            surfaces = estimate_surfaces(self.estimator, small)
+        features = lamp_features(small, masks_to_grid(masks, size), burning, surfaces)
         fields = run_network(self.net, features, burning)
         return finish(fields, small, image_linear, masks, burning)
 
 
 def run_network(
-    net: LampNet,
+    net: UNet,
     features: Float[Tensor, "k c y x"],
     on: Bool[Tensor, " k"],
     warped: WarpedLight | None = None,

@@ -17,11 +17,13 @@ from luxcore.models.small.samples import chw
 class Surfaces:
     """Geometry of one photo on the network's grid; zeros where unknown.
 
-    `points` are camera-space positions in metres, `normals` unit vectors in camera axes.
+    `points` are camera-space positions in metres, `normals` unit vectors in camera axes. `trust`
+    is 1 for given geometry and less for what was estimated from the photo.
     """
 
     points: Float[Tensor, "3 h w"]
     normals: Float[Tensor, "3 h w"]
+    trust: float = 1.0
 
     @property
     def valid(self) -> Bool[Tensor, "h w"]:

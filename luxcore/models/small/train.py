@@ -14,16 +14,17 @@ import numpy as np
 
 from luxcore.errors import LuxError
 from luxcore.files.photos import write_png
+from luxcore.models.small.geometry_training import train_geometry
 from luxcore.models.small.training import train_mv, train_sv
 from luxcore.settings.train_mv import TrainMvSettings
-from luxcore.settings.train_sv import TrainSvSettings
+from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
 STEPS = 20_000
 """About three hours on two quiet cores at 96 px."""
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("kind", type=click.Choice(["sv", "mv"]))
+@click.argument("kind", type=click.Choice(["geometry", "sv", "mv"]))
 @click.option("--data", required=True, type=click.Path(path_type=Path), help="Rendered rooms.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--base", default=None, help='Weights to start from, or "shipped".')
@@ -45,7 +46,8 @@ def main(
     rate: float,
     seed: int,
 ) -> None:
-    """Train the single-view (sv) or multi-view (mv) model and write weights, card and curve."""
+    """Train the geometry, the single-view (sv) or the multi-view (mv) model, in this order: each
+    takes the shipped weights of those before it. Writes weights, card and curve."""
     shared = {
         "steps": steps,
         "groups": groups,
@@ -61,6 +63,12 @@ def main(
     out.mkdir(parents=True, exist_ok=True)
     checkpoint = out / "state.ckpt"
     try:
+        if kind == "geometry":
+            scores = train_geometry(
+                data, out, TrainingSettings(**shared), seed, checkpoint=checkpoint
+            )
+            click.echo(f"{out}: {scores}")
+            return
         if kind == "sv":
             result = train_sv(data, out, TrainSvSettings(**shared), seed, checkpoint=checkpoint)
         else:

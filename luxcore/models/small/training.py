@@ -6,7 +6,7 @@ The same code serves the short fine-tuning of the train stages and the full reci
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,16 +20,26 @@ from luxcore.data.multiview import MultiViewSets
 from luxcore.errors import InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.digests import value_digest
-from luxcore.models.small.batches import GroupBatches, SingleBatches, group_example
+from luxcore.models.small.batches import (
+    GroupBatches,
+    SingleBatches,
+    group_example,
+    single_features,
+)
 from luxcore.models.small.examples import Example, to_example
-from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
-from luxcore.models.small.fit import Batches, FitResult, FitSettings, fit
-from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS, LampNet, NetworkShape
+from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
+from luxcore.models.small.fit import Batches, FitResult, FitSettings, Validate, fit
+from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS, LampNet, NetworkShape, UNet
 from luxcore.models.small.pictures import validation_sheet
 from luxcore.models.small.samples import CropPool, relit
-from luxcore.models.small.scores import mean_psnr
+from luxcore.models.small.scores import lamp_scores, mean_psnr
 from luxcore.models.small.sketch import SketchRooms
-from luxcore.models.small.weights import load_network, save_weights, shipped_weights
+from luxcore.models.small.weights import (
+    load_network,
+    save_weights,
+    shipped_estimator,
+    shipped_weights,
+)
 from luxcore.settings.train_mv import TrainMvSettings
 from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
@@ -69,8 +79,11 @@ def train_sv(
     """
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("sv", base_weights("sv", settings, base), seed)
-    batches = SingleBatches(pool, seed, settings.photos_per_step, settings.geometry_share)
-    cases = single_cases(aside, seed)
+    estimator = shipped_estimator()
+    batches = SingleBatches(
+        pool, seed, settings.photos_per_step, settings.geometry_share, estimator
+    )
+    cases = single_cases(aside, seed, estimator)
     return _train("sv", net, batches, cases, settings, out, checkpoint, dataset_dir)
 
 
@@ -112,7 +125,7 @@ def pools(dataset_dir: Path, settings: TrainingSettings, seed: int) -> tuple[Cro
     return pool, CropPool.collect(held_out, range(settings.validation_groups), views)
 
 
-def start_network(kind: str, base: Path | None, seed: int) -> LampNet:
+def start_network(kind: str, base: Path | None, seed: int) -> UNet:
     """The network to train: from `base`, else new; a new multi-view network takes the shipped
     single-view weights for the channels that both have."""
     if base is not None:
@@ -124,7 +137,7 @@ def start_network(kind: str, base: Path | None, seed: int) -> LampNet:
     return net
 
 
-def widen(narrow: LampNet, wide: LampNet) -> None:
+def widen(narrow: UNet, wide: UNet) -> None:
     """Copy weights of a network with fewer inputs and outputs; the further ones start at zero."""
     weights = dict(narrow.state_dict())
     for name in ("stem.weight", "head.weight", "head.bias"):
@@ -134,15 +147,15 @@ def widen(narrow: LampNet, wide: LampNet) -> None:
     wide.load_state_dict(weights)
 
 
-def single_cases(pool: CropPool, seed: int) -> Cases:
-    """Every photo once, under a light drawn from its number, without and with geometry in turn."""
+def single_cases(pool: CropPool, seed: int, estimator: UNet | None = None) -> Cases:
+    """Every photo once, under a light drawn from its number, with guessed and with given geometry
+    in turn."""
     cases = []
     for number, crop in enumerate(pool.photos()):
         rng = Generator(PCG64(SeedSequence((seed, number))))
         example = to_example(relit([crop], rng)[0], geometry=number % 2 == 1)
         if len(example.on):
-            features = lamp_features(example.photo, example.masks, example.on, example.surfaces)
-            cases.append((features, example))
+            cases.append((single_features(example, estimator), example))
     return cases
 
 
@@ -169,7 +182,7 @@ def base_weights(kind: str, settings: TrainingSettings, base: Path | None) -> Pa
 
 def _train(
     kind: str,
-    net: LampNet,
+    net: UNet,
     batches: Batches,
     cases: Cases,
     settings: TrainingSettings,
@@ -181,7 +194,7 @@ def _train(
         raise InputError(f"{dataset_dir} shows no lamp in its validation photos.")
     before = mean_psnr(net.eval(), cases)
     original = {name: value.detach().clone() for name, value in net.state_dict().items()}
-    result = _fit(net, batches, settings, lambda n: mean_psnr(n, cases), checkpoint)
+    result = _fit(net, batches, settings, lambda n: lamp_scores(n, cases), checkpoint)
     after = result.curve[-1]["psnr_validation"] if result.curve else before
     improved = after > before
     chosen = result.weights if improved else original
@@ -200,22 +213,26 @@ def _train(
 
 
 def _fit(
-    net: LampNet,
+    net: UNet,
     batches: Batches,
     settings: TrainingSettings,
-    validate: Callable[[LampNet], float],
+    validate: Validate,
     checkpoint: Path | None,
 ) -> FitResult:
     if settings.steps == 0:
         return FitResult(net.state_dict(), [])
-    fitting = FitSettings(
+    return fit(net, batches, fit_settings(settings), validate, checkpoint)
+
+
+def fit_settings(settings: TrainingSettings) -> FitSettings:
+    """The loop's settings for a training's."""
+    return FitSettings(
         settings.steps,
         settings.rate,
         warmup=min(50, max(1, settings.steps // 10)),
         cooldown=settings.cooldown,
         check_every=settings.check_every,
     )
-    return fit(net, batches, fitting, validate, checkpoint)
 
 
 def _card(

@@ -14,20 +14,26 @@ from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import atomic_file
 from luxcore.files.tensors import settle_header
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
+from luxcore.models.small.geometry import GEOMETRY_OUTPUTS, PHOTO_CHANNELS
 from luxcore.models.small.network import (
     MV_OUTPUTS,
     SV_OUTPUTS,
     LampNet,
     NetworkShape,
+    UNet,
     channels_last,
 )
 
 FORMAT = "lux-small-1"
-CHANNELS = {"sv": (SV_CHANNELS, SV_OUTPUTS), "mv": (MV_CHANNELS, MV_OUTPUTS)}
+CHANNELS = {
+    "sv": (SV_CHANNELS, SV_OUTPUTS),
+    "mv": (MV_CHANNELS, MV_OUTPUTS),
+    "geometry": (PHOTO_CHANNELS, GEOMETRY_OUTPUTS),
+}
 """Inputs and outputs that this version builds and understands."""
 
 SHIPPED = Path(__file__).parents[1] / "weights"
-"""`sv.safetensors` and `mv.safetensors`, trained by the recipe in docs/models.md."""
+"""`geometry`, `sv` and `mv` `.safetensors`, trained by the recipe in docs/models.md."""
 
 MAX_BYTES = 200_000_000
 
@@ -37,8 +43,14 @@ def shipped_weights(kind: str) -> Path:
     return SHIPPED / f"{kind}.safetensors"
 
 
+def shipped_estimator() -> UNet | None:
+    """The shipped geometry network; None in a source tree that has none yet."""
+    path = shipped_weights("geometry")
+    return load_network(path, "geometry") if path.is_file() else None
+
+
 def save_weights(path: Path, kind: str, shape: NetworkShape, weights: Mapping[str, Tensor]) -> None:
-    """Write `weights` of a network of `shape` as half precision. `kind`: "sv" or "mv"."""
+    """Write `weights` of a network of `shape` as half precision. `kind`: of `CHANNELS`."""
     from safetensors.torch import save_file
 
     metadata = {"format": FORMAT, "kind": kind, "shape": json.dumps(shape.as_metadata())}
@@ -48,7 +60,12 @@ def save_weights(path: Path, kind: str, shape: NetworkShape, weights: Mapping[st
         settle_header(temporary)
 
 
-def load_network(path: Path, kind: str) -> LampNet:
+def network_class(kind: str) -> type[UNet]:
+    """The class of a kind: lamps are seen by a LampNet, a whole photo by a plain U-Net."""
+    return UNet if kind == "geometry" else LampNet
+
+
+def load_network(path: Path, kind: str) -> UNet:
     """The network of a weights file, ready to run.
 
     Raises InputError (missing) or FormatError: not safetensors (pickles are never opened), of
@@ -61,7 +78,7 @@ def load_network(path: Path, kind: str) -> LampNet:
     try:
         fields = json.loads(metadata["shape"])
         shape = NetworkShape(**{**fields, "widths": tuple(fields["widths"])})
-        net = LampNet(shape)
+        net = network_class(kind)(shape)
     except (KeyError, TypeError, ValueError, RuntimeError, ZeroDivisionError) as error:
         raise FormatError(f"{path} describes no usable network: {error}.") from error
     if (shape.inputs, shape.outputs) != CHANNELS[kind]:
@@ -89,7 +106,7 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
         raise FormatError(f"{path} is not a safetensors file: {error}.") from error
 
 
-def _check_tensors(path: Path, tensors: Mapping[str, Tensor], net: LampNet) -> None:
+def _check_tensors(path: Path, tensors: Mapping[str, Tensor], net: UNet) -> None:
     expected = net.state_dict()
     strange = sorted(set(tensors) ^ set(expected))
     if strange:
