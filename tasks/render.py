@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from luxcore.render.contact_sheet import write_contact_sheet
+from luxcore.statistics.contact_sheet import write_contact_sheet
 from luxcore.render.dataset import render_dataset
 from tasks.context import StageContext
 

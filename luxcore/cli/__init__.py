@@ -21,10 +21,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "splat": ("luxcore.cli.splat:command", "Rasterize any 3D Gaussian splatting PLY."),
     "decompose": ("luxcore.cli.decompose:command", "One photo and lamp masks to one image a lamp."),
     "render": ("luxcore.cli.render:command", "Render rooms in the public dataset layout."),
+    "statistics": ("luxcore.cli.statistics:command", "A page about a rendered dataset."),
     "hdr": ("luxcore.cli.hdr:command", "Merge a photographer's bracket to linear HDR."),
     "evaluate": ("luxcore.cli.evaluate:command", "The tables of scores on a dataset."),
     "tradeoff": ("luxcore.cli.tradeoff:command", "What accuracy costs in time: Pareto curves."),
-    "dashboards": ("luxcore.cli.dashboards:command", "Start mlflow's and Prefect's pages."),
+    "dashboards": ("flows.cli:dashboards", "Start mlflow's and Prefect's pages."),
 }
 """Name → ("module:attribute", one line of help), in the order that `lux --help` shows."""
 

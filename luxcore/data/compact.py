@@ -16,6 +16,7 @@ from luxcore.files.atomic import write_json
 from luxcore.files.exr import read_exr, write_exr
 
 MASK_KINDS = ("emitter", "fixture", "hull")
+MASKS_FILE = ".masks.exr"
 COMPACT_VERSION = 1
 
 
@@ -76,7 +77,7 @@ def load_rendered(path_stem: Path) -> RenderedView:
     stem = _stem(Path(path_stem))
     about = read_metadata(stem)
     images, geometry = read_exr(_beside(stem, ".exr")), read_exr(_beside(stem, ".geometry.exr"))
-    masks = read_exr(_beside(stem, ".masks.exr"))
+    masks = read_exr(_beside(stem, MASKS_FILE))
     _check_sizes(stem, [*images.values(), *geometry.values(), *masks.values()])
     try:
         lamps = tuple(_lamp(entry) for entry in about["lamps"])
@@ -119,7 +120,7 @@ def save_rendered(view: RenderedView, path_stem: Path) -> int:
         for i, mask in enumerate(view.masks[kind])
     }
     masks["window"] = view.window.astype(np.float32)
-    write_exr(_beside(stem, ".masks.exr"), masks)
+    write_exr(_beside(stem, MASKS_FILE), masks)
     write_json(_beside(stem, ".json"), {**_metadata(view), "clipped_values": clipped})
     return clipped
 
@@ -202,7 +203,7 @@ def _beside(stem: Path, suffix: str) -> Path:
 
 def _is_view(path: Path) -> bool:
     stem = path.with_suffix("")
-    return _beside(stem, ".exr").is_file() and _beside(stem, ".masks.exr").is_file()
+    return _beside(stem, ".exr").is_file() and _beside(stem, MASKS_FILE).is_file()
 
 
 def _lamp(entry: dict[str, Any]) -> Lamp:

@@ -67,11 +67,19 @@ def write_scene(root: Path, scene_id: str, views: Sequence[RenderedView], *, see
 
 def write_shards(scenes: Sequence[Path], out: Path, split: str) -> list[Path]:
     """Pack scene folders into `split`-NNNN.tar, ten consecutive ids each; same bytes every time."""
-    shards: dict[int, list[Path]] = {}
-    for scene in sorted(scenes, key=lambda p: p.name):
-        shards.setdefault(int(scene.name) // SCENES_PER_SHARD, []).append(scene)
-    first = min(shards, default=0)
-    return [_write_shard(out / f"{split}-{n - first:04d}.tar", shards[n]) for n in sorted(shards)]
+    shards = shard_members([scene.name for scene in scenes], split)
+    folders = {scene.name: scene for scene in scenes}
+    return [_write_shard(out / f"{n}.tar", [folders[i] for i in ids]) for n, ids in shards.items()]
+
+
+def shard_members(scene_ids: Sequence[str], split: str) -> dict[str, list[str]]:
+    """Which scenes go into which shard: name → ids, in order."""
+    first = min((int(i) // SCENES_PER_SHARD for i in scene_ids), default=0)
+    shards: dict[str, list[str]] = {}
+    for scene_id in sorted(scene_ids):
+        number = int(scene_id) // SCENES_PER_SHARD - first
+        shards.setdefault(f"{split}-{number:04d}", []).append(scene_id)
+    return shards
 
 
 def _check(scene_id: str, views: Sequence[RenderedView]) -> None:

@@ -49,7 +49,7 @@ class ViewStore:
         if number in self._sources:
             self._sources.move_to_end(number)
             return self._sources[number]
-        source = ViewSource(_loaded(self._views[number]))
+        source = ViewSource(load_view(self._views[number]))
         self._sources[number] = source
         while len(self._sources) > self._kept:
             self._sources.popitem(last=False)
@@ -61,7 +61,8 @@ class ViewStore:
         return str(read_metadata(view).get("room")) if isinstance(view, Path) else view.room
 
 
-def _loaded(view: AnyView) -> RenderedView:
+def load_view(view: AnyView) -> RenderedView:
+    """The view, read where it lies."""
     if isinstance(view, Path):
         return load_rendered(view)
     return view if isinstance(view, RenderedView) else view.load()

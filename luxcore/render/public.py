@@ -1,24 +1,28 @@
-"""Rooms to the public dataset layout: one scene folder a room, a contact sheet, statistics."""
+"""Rooms to the public dataset layout: one scene folder a room, and a page about all of them."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from luxcore.data.compact import RenderedView, load_rendered
-from luxcore.data.public_writer import write_scene, write_shards
+import numpy as np
+
+from luxcore.data.compact import load_rendered
+from luxcore.data.public_writer import shard_members, write_scene, write_shards
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
-from luxcore.render.contact_sheet import write_contact_sheet
 from luxcore.render.dataset import check_disk, panorama_jobs, run_jobs
-from luxcore.render.statistics import view_statistics
 from luxcore.rooms.generate import generate_room
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
 from luxcore.settings.rooms import RoomsSettings
-from luxcore.units import Executor, UnitStore
+from luxcore.statistics.contact_sheet import contact_sheet, save_sheet
+from luxcore.statistics.dataset import PAGE, SHEET
+from luxcore.statistics.facts import ViewFacts, facts_of_files
+from luxcore.statistics.page import write_page
+from luxcore.units import Executor, UnitStore, read_seconds
 
 LAST_SCENE_ID = 999_999
 
@@ -55,33 +59,60 @@ def render_public(
     # What the public layout takes comes on top of the units; it is of the same order.
     check_disk(flat + flat, out)
     failed = run_jobs(flat, work / "views", settings, UnitStore(work / "units"), executor)
-    scenes, views = [], 0
+    seconds = read_seconds(UnitStore(work / "units"))
+    shown: dict[str, Shown] = {}
     for room in rooms:
-        stems = [work / "views" / j.stem for j in jobs[room.id] if j.unit.name not in failed]
-        if stems:
-            loaded = [load_rendered(stem) for stem in stems]
-            scenes.append(write_scene(out, room.id, loaded, seed=room.seed))
-            views += len(loaded)
-            _write_statistics(out / "statistics" / f"{room.id}.json", loaded)
-    if not scenes:
+        done = [job for job in jobs[room.id] if job.unit.name not in failed]
+        if done:
+            stems = [work / "views" / job.stem for job in done]
+            write_scene(out, room.id, [load_rendered(stem) for stem in stems], seed=room.seed)
+            facts = [
+                facts_of_files(work / "views" / j.stem, j.stem, seconds.get(j.unit.name))
+                for j in done
+            ]
+            shown[room.id] = Shown(stems, facts)
+    if not shown:
         raise LuxError(f"no view of {len(rooms)} rooms could be rendered: {_first(failed)}")
-    write_contact_sheet(work / "views", out / "contact_sheet.png")
+    _write_pages(out, shown, shard_split)
+    scenes = [out / scene_id for scene_id in shown]
     if shard_split is not None:
         write_shards(scenes, out, shard_split)
         for scene in scenes:
             shutil.rmtree(scene)
     shutil.rmtree(work)
-    return PublicRender(tuple(scenes), views, failed)
+    return PublicRender(tuple(scenes), sum(len(s.stems) for s in shown.values()), failed)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The finished views of one room, and what their files say."""
+
+    stems: list[Path]
+    facts: list[ViewFacts]
+
+
+def _write_pages(out: Path, shown: dict[str, Shown], shard_split: str | None) -> None:
+    """statistics.html about everything, one page a shard, one JSON a room."""
+    for room, views in shown.items():
+        facts = [asdict(fact) for fact in views.facts]
+        write_json(out / "statistics" / f"{room}.json", {"views": facts})
+    sheet = _write_page(out / PAGE, out.resolve().name, shown)
+    save_sheet(out / SHEET, sheet)
+    if shard_split is not None:
+        for name, members in shard_members(list(shown), shard_split).items():
+            _write_page(out / f"{name}.html", name, {i: shown[i] for i in members})
+
+
+def _write_page(path: Path, title: str, shown: dict[str, Shown]) -> np.ndarray:
+    sheet = contact_sheet([stem for views in shown.values() for stem in views.stems])
+    write_page(path, title, [fact for views in shown.values() for fact in views.facts], sheet)
+    return sheet
 
 
 def _room(seed: int, settings: RoomsSettings) -> Room:
     if not 0 <= seed <= LAST_SCENE_ID:
         raise InputError(f"seed {seed} has no six-digit scene id: use 0 to {LAST_SCENE_ID}.")
     return generate_room(seed, settings)
-
-
-def _write_statistics(path: Path, views: list[RenderedView]) -> None:
-    write_json(path, {"views": [view_statistics(view) for view in views]})
 
 
 def _first(failed: dict[str, str]) -> str:

@@ -81,14 +81,14 @@ def missing_units(units: Sequence[Unit], store: UnitStore) -> list[Unit]:
 
 
 def read_seconds(store: UnitStore) -> dict[str, dict[str, float]]:
-    """CPU seconds by step of every unit that was computed here, by the unit's key."""
+    """CPU seconds by step of the units that were computed here, by name; the latest counts."""
     path = store.root / SECONDS
     seconds = {}
     for line in path.read_text().splitlines() if path.is_file() else ():
         # A run that was killed may leave half a line.
         with suppress(ValueError):
             entry = json.loads(line)
-            seconds[entry["key"]] = entry["seconds"]
+            seconds[entry["unit"]] = entry["seconds"]
     return seconds
 
 

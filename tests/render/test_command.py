@@ -71,12 +71,29 @@ def test_command_writes_the_public_layout(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     answer = json.loads(result.stdout.splitlines()[-1])
     assert answer == {"scenes": ["000011"], "views": 1, "failed": {}}
-    assert {p.name for p in out.iterdir()} == {"000011", "contact_sheet.png", "statistics"}
+    names = {"000011", "contact_sheet.png", "statistics", "statistics.html"}
+    assert {p.name for p in out.iterdir()} == names
     assert [view.room for view in public_views(out / "000011")] == ["000011"]
     statistics = json.loads((out / "statistics" / "000011.json").read_text())
     lamps = statistics["views"][0]["lamps"]
     assert len(lamps) == len(generate_room(11, RoomsSettings()).lamps)
     assert statistics["views"][0]["effects"]["diffuse"]["amount"] == 8
+    steps = {"build", "render", "denoise", "top_up", "write"}
+    assert set(statistics["views"][0]["seconds"]) == steps
+    assert "CPU seconds by step" in (out / "statistics.html").read_text()
+
+
+@pytest.mark.blender
+def test_every_shard_has_a_page(tmp_path: Path) -> None:
+    out = tmp_path / "set"
+    arguments = ["--rooms", "2", "--seed", "19", "--size", "32x16", "--spp", "1", "--views", "1"]
+    result = CliRunner().invoke(command, [*arguments, "--out", str(out), "--shards", "training"])
+    assert result.exit_code == 0, result.output
+    shards = {f"training-000{n}.{kind}" for n in (0, 1) for kind in ("tar", "html")}
+    names = {"contact_sheet.png", "statistics", "statistics.html"}
+    assert {p.name for p in out.iterdir()} == names | shards
+    assert "<dt>rooms</dt><dd>1</dd>" in (out / "training-0001.html").read_text()
+    assert "<dt>rooms</dt><dd>2</dd>" in (out / "statistics.html").read_text()
 
 
 @pytest.mark.parametrize("size", ["64x33", "64", "axb", "16x8", "x", "-64x-32"])
