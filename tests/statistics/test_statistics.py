@@ -75,7 +75,7 @@ def test_quantiles_of_known_numbers() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0, "0"),
+        (0.0, "0"),
         (0.012345, "0.0123"),
         (4.5, "4.5"),
         (12345.6, "12,346"),
