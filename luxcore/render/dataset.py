@@ -95,6 +95,7 @@ def run_jobs(
         executor,
         label="views",
         max_failed_ratio=settings.max_failed_ratio,
+        spare_bytes=SPARE_BYTES,
     )
     for job in jobs:
         if job.unit.name in result.folders:

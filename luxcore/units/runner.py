@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -38,6 +39,8 @@ class Ended:
 
     problem: str | None
     seconds: dict[str, float] | None = None
+    disk_is_short: bool = False
+    """It was not begun: the failure is not the unit's."""
 
 
 @dataclass
@@ -57,18 +60,34 @@ def run_units(
     label: str = "units",
     max_failed_ratio: float = 0.0,
     limits: Limits | None = None,
+    spare_bytes: int = 0,
 ) -> UnitsResult:
-    """Compute what `store` lacks. Raises LuxError naming the failures above `max_failed_ratio`."""
+    """Compute what `store` lacks.
+
+    No unit is begun where the store's disk has less than `spare_bytes` free. Raises LuxError when
+    that happens, and naming the failures when they are more than `max_failed_ratio` of all.
+    """
     result, missing = _split(units, store)
-    rows = [(str(store.root), u.key, u.function, u.arguments, limits) for u in missing]
+    rows = [(str(store.root), u.key, u.function, u.arguments, limits, spare_bytes) for u in missing]
+    short = 0
     with progress(label, len(missing), "units", quiet=not missing) as bar:
         for index, outcome in (executor or SerialExecutor()).run(_compute, rows):
             # A worker that died gives an exception instead.
             ended = outcome if isinstance(outcome, Ended) else Ended(sentence(outcome))
+            if ended.disk_is_short:
+                short += 1
+                continue
             _record(result, store, missing[index], ended)
             bar.advance(failed=len(result.failed), reused=result.reused)
+    for unit in missing:
+        store.clear_leftovers(unit.key)
     if result.failed:
         _quarantine(store, result.failed)
+    if short:
+        raise LuxError(
+            f"{store.root} has less than {spare_bytes / 1e6:.0f} MB free: stopped before {short} of "
+            f"{len(units)} {label}; make room and start again, what is done is kept."
+        )
     if len(result.failed) > max_failed_ratio * len(units):
         name, reason = next(iter(sorted(result.failed.items())))
         raise LuxError(f"{len(result.failed)} of {len(units)} {label} failed: {name}: {reason}")
@@ -118,9 +137,17 @@ def _record(result: UnitsResult, store: UnitStore, unit: Unit, ended: Ended) -> 
 
 
 def _compute(
-    root: str, key: str, function: str, arguments: dict[str, Any], limits: Limits | None
+    root: str,
+    key: str,
+    function: str,
+    arguments: dict[str, Any],
+    limits: Limits | None,
+    spare_bytes: int,
 ) -> Ended:
     """Run one unit in whatever process this is; a reason comes back instead of an exception."""
+    Path(root).mkdir(parents=True, exist_ok=True)
+    if shutil.disk_usage(root).free < spare_bytes:
+        return Ended("the disk is short", disk_is_short=True)
     returned: list[Any] = []
 
     def write(out: Path) -> None:

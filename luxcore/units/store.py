@@ -56,6 +56,12 @@ class UnitStore:
             seal_folder(temporary)
         return folder
 
+    def clear_leftovers(self, key: str) -> None:
+        """Remove what a process that was killed left of this unit; none may be at work on it."""
+        folder = self.path(key)
+        for temporary in folder.parent.glob(f".{folder.name}-*"):
+            shutil.rmtree(temporary, ignore_errors=True)
+
 
 def seal_folder(folder: Path) -> None:
     """Write the manifest: relative name → sha256 of every file in `folder`."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections import namedtuple
 from pathlib import Path
 
 import pytest
@@ -76,6 +78,7 @@ def test_a_unit_whose_process_is_killed_does_not_take_the_others_along(tmp_path)
     result = run_units(units, UnitStore(tmp_path), ProcessExecutor(2), max_failed_ratio=0.5)
     assert sorted(result.failed) == ["victim"]
     assert len(result.folders) == 4
+    assert not list(tmp_path.glob("*/.*"))
 
 
 def test_time_out_and_memory_cap_are_said_and_leave_nothing(tmp_path):
@@ -86,6 +89,20 @@ def test_time_out_and_memory_cap_are_said_and_leave_nothing(tmp_path):
     assert "took longer than 5 s" in result.failed["slow"]
     assert "needed more than 4000 MB" in result.failed["hungry"]
     assert not list(tmp_path.rglob("started"))
+
+
+def test_a_disk_that_runs_short_stops_the_run_and_keeps_what_is_done(tmp_path, monkeypatch):
+    free = iter([900, 900, 100, 100, 100])
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(1000, 0, next(free)))
+    units, store = units_of("draw", range(5)), UnitStore(tmp_path)
+    with pytest.raises(LuxError, match=r"stopped before 3 of 5 rooms; make room"):
+        run_units(units, store, label="rooms", max_failed_ratio=1.0, spare_bytes=500)
+    assert [store.has(u.key) for u in units] == [True, True, False, False, False]
+    # Nothing is wrong with those that were not begun.
+    assert not (tmp_path / "quarantine.jsonl").exists()
+    monkeypatch.undo()
+    assert run_units(units, store).reused == 2
 
 
 def test_a_killed_run_resumes_with_what_is_missing(tmp_path):
@@ -108,6 +125,7 @@ def test_a_killed_run_resumes_with_what_is_missing(tmp_path):
     assert 0 < kept < 40
     result = run_units(units, store)
     assert result.reused == kept
+    assert not list(root.glob("*/.*"))
     unbroken = run_units(units_of("draw", range(40)), UnitStore(tmp_path / "unbroken"))
     assert contents(result.folders) == contents(unbroken.folders)
 
