@@ -85,8 +85,8 @@ def run_units(
         _quarantine(store, result.failed)
     if short:
         raise LuxError(
-            f"{store.root} has less than {spare_bytes / 1e6:.0f} MB free: stopped before {short} of "
-            f"{len(units)} {label}; make room and start again, what is done is kept."
+            f"{store.root} has less than {spare_bytes / 1e6:.0f} MB free: stopped before "
+            f"{short} of {len(units)} {label}; make room and start again, what is done is kept."
         )
     if len(result.failed) > max_failed_ratio * len(units):
         name, reason = next(iter(sorted(result.failed.items())))

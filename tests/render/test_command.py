@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from luxcore.render.dataset import (
     estimated_bytes,
     panorama_jobs,
     render_dataset,
+    run_jobs,
 )
 from luxcore.rooms import generate_room
 from luxcore.rooms.batch import demo_room, write_rooms
@@ -94,6 +96,24 @@ def test_every_shard_has_a_page(tmp_path: Path) -> None:
     assert {p.name for p in out.iterdir()} == names | shards
     assert "<dt>rooms</dt><dd>1</dd>" in (out / "training-0001.html").read_text()
     assert "<dt>rooms</dt><dd>2</dd>" in (out / "statistics.html").read_text()
+
+
+@pytest.mark.blender
+def test_a_room_that_fails_is_set_aside_and_the_rest_goes_on(tmp_path: Path) -> None:
+    good = generate_room(19, RoomsSettings())
+    broken = replace(good, seed=20, materials={})
+    settings = TINY.model_copy(update={"max_failed_ratio": 0.5})
+    jobs = panorama_jobs([broken, good], settings, "train")
+    store = UnitStore(tmp_path / "units")
+    failed = run_jobs(jobs, tmp_path / "out", settings, store, SerialExecutor())
+    assert list(failed) == ["train/000000"]
+    assert "KeyError" in failed["train/000000"]
+    assert [p.name for p in list_rendered(tmp_path / "out")] == ["000001"]
+    (line,) = (store.root / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(line) == {"unit": "train/000000", "reason": failed["train/000000"]}
+    strict = TINY.model_copy(update={"max_failed_ratio": 0.4})
+    with pytest.raises(LuxError, match="1 of 2 views failed: train/000000"):
+        run_jobs(jobs, tmp_path / "strict", strict, store, SerialExecutor())
 
 
 @pytest.mark.parametrize("size", ["64x33", "64", "axb", "16x8", "x", "-64x-32"])
