@@ -6,9 +6,10 @@
 // block of pixels; they see the alphas and stop where raster_forward does. apply and
 // apply_transposed gather, one work-item per row, over CHANNELS values in float16s: they read up to
 // 16 floats beyond the last row, so such arrays are allocated with 16 rows to spare.
-// Compile-time: CHANNELS, ALPHA_MIN, ALPHA_MAX, TRANSMITTANCE_MIN, LOG2_ALPHA_MIN, TILE.
+// Compile-time: CHANNELS, ALPHA_MIN, ALPHA_MAX, TRANSMITTANCE_MIN, LOG2_ALPHA_MIN, TILE;
+// HALF_WEIGHTS where apply reads weights of 16 bits.
 #include "blending.cl"
-#line 13 "bake.cl"
+#line 14 "bake.cl"
 
 #define LANE_X ((float16)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
 #define LANE_Y ((float16)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
@@ -80,6 +81,12 @@ __kernel void weights_fill(const int2 size, __global const int2 *ranges,
   }
 }
 
+#ifdef HALF_WEIGHTS
+#define WEIGHT(weights, entry) vload_half(entry, (__global const half *)(weights))
+#else
+#define WEIGHT(weights, entry) (weights)[entry]
+#endif
+
 // out [rows, CHANNELS] = W values. Rows are pixels, or Gaussians for the transposed matrix. One
 // float16 of channels at a time: with several, the sums would not stay in registers.
 __kernel void apply(__global const int *start, __global const int *others,
@@ -90,7 +97,7 @@ __kernel void apply(__global const int *start, __global const int *others,
   for (int first = 0; first < CHANNELS; first += 16) {
     float16 sum = (float16)(0.0f);
     for (int e = start[row]; e < start[row + 1]; ++e)
-      sum = fma(weights[e], vload16(0, values + (size_t)others[e] * CHANNELS + first), sum);
+      sum = fma(WEIGHT(weights, e), vload16(0, values + (size_t)others[e] * CHANNELS + first), sum);
     for (int c = first; c < min(first + 16, CHANNELS); ++c)
       out[(size_t)row * CHANNELS + c] = ((float *)&sum)[c - first];
   }
