@@ -11,6 +11,8 @@ import click
 from luxcore.errors import InputError
 
 if TYPE_CHECKING:
+    from luxcore.tradeoff.advise import Advice
+    from luxcore.tradeoff.knob import Bench
     from luxcore.tradeoff.sweep import Sweep
 
 QUALITIES = ("low", "default", "high")
@@ -32,6 +34,7 @@ QUALITIES = ("low", "default", "high")
 @click.option("--repeats", default=3, show_default=True, type=click.IntRange(1, 100))
 @click.option("--budget", help="Choose settings for a time such as 2min from OUT/tradeoff.json.")
 @click.option("--quality", type=click.Choice(QUALITIES), help="Choose settings by quality instead.")
+@click.option("--try", "trying", is_flag=True, help="Run the chosen settings; compare on the page.")
 def command(
     artifacts: Path,
     capture: str,
@@ -40,45 +43,51 @@ def command(
     repeats: int,
     budget: str | None,
     quality: str | None,
+    trying: bool,
 ) -> None:
     """What accuracy costs in time: one Pareto curve per knob, the rest at the program's defaults.
 
-    Knobs measured before on the same capture and machine are kept in OUT/tradeoff.json.
-    With --budget or --quality nothing is measured: settings are chosen from the last sweep, and
-    what they are expected to take is printed.
+    Knobs measured before on the same machine are kept in OUT/tradeoff.json. With --budget or
+    --quality nothing is swept: settings are chosen from the last sweep, and what they are expected
+    to take is printed.
     """
     if budget and quality:
         raise InputError("give --budget or --quality, not both.")
+    if trying and not (budget or quality):
+        raise InputError("--try runs what --budget or --quality chooses: give one of them.")
     if budget or quality:
-        _advise(out / "tradeoff.json", budget, quality)
-        return
-    _measure(artifacts, capture, out, names, repeats)
+        _advise(artifacts, capture, out, budget, quality, trying=trying)
+    else:
+        _measure(artifacts, capture, out, names, repeats)
 
 
 def _measure(
     artifacts: Path, capture: str, out: Path, names: tuple[str, ...], repeats: int
 ) -> None:
-    from luxcore.settings.project import ProjectSettings
-    from luxcore.tradeoff.knob import Bench
     from luxcore.tradeoff.knobs import KNOBS, ORDER
     from luxcore.tradeoff.page import write_tradeoffs
-    from luxcore.tradeoff.sweep import measure, merged
+    from luxcore.tradeoff.store import merged
+    from luxcore.tradeoff.sweep import measure
 
     chosen = [knob for knob in KNOBS if not names or any(name in knob.name for name in names)]
     if not chosen:
         raise InputError(f"no knob is called so; there are: {'; '.join(k.name for k in KNOBS)}.")
-    with tempfile.TemporaryDirectory(prefix="lux-tradeoff-") as scratch:
-        sweeps = []
-        for index, knob in enumerate(chosen):
-            folder = Path(scratch) / str(index)
-            folder.mkdir()
-            sweeps.append(
-                measure(knob, Bench(artifacts, folder, ProjectSettings(), capture), repeats)
-            )
-            _tell(sweeps[-1])
-            about = _about(capture)
-            # After every knob: a sweep that is interrupted keeps what it has measured.
-            write_tradeoffs(out, merged(out / "tradeoff.json", sweeps, about, ORDER), about)
+    sweeps = []
+    for knob in chosen:
+        with tempfile.TemporaryDirectory(prefix="lux-tradeoff-") as scratch:
+            bench = _bench(artifacts, Path(scratch), capture)
+            try:
+                sweep = measure(knob, bench, repeats)
+            except InputError as error:
+                # Photos have no known light: knobs that need it are not for them.
+                click.echo(f"{knob.name}: left out, {error}")
+                continue
+        sweeps.append(sweep)
+        _tell(sweep)
+        # After every knob: a sweep that is interrupted keeps what it has measured.
+        write_tradeoffs(out, merged(out / "tradeoff.json", sweeps, _about(), ORDER))
+    if not sweeps:
+        raise InputError(f"no knob could be measured on capture {capture}.")
     click.echo(f"{out / 'tradeoff.html'}")
 
 
@@ -86,7 +95,7 @@ def _tell(sweep: Sweep) -> None:
     from luxcore.tradeoff.sweep import front
 
     best = {point.label for point in front(sweep.points)}
-    click.echo(f"{sweep.knob}: {sweep.error_name}")
+    click.echo(f"{sweep.knob} on {sweep.scene}: {sweep.error_name}")
     for point in sweep.points:
         marks = (" best for its time" if point.label in best else "") + (
             " (default)" if point.label == sweep.default else ""
@@ -94,30 +103,66 @@ def _tell(sweep: Sweep) -> None:
         click.echo(f"  {point.label:28} {point.seconds:9.3f} CPU-s  {point.error:.5f}{marks}")
 
 
-def _advise(path: Path, budget: str | None, quality: str | None) -> None:
+def _advise(
+    artifacts: Path,
+    capture: str,
+    out: Path,
+    budget: str | None,
+    quality: str | None,
+    *,
+    trying: bool,
+) -> None:
     from luxcore.tradeoff.advise import parse_budget, with_quality, within_budget
-    from luxcore.tradeoff.sweep import load_sweeps
+    from luxcore.tradeoff.store import load_measured
 
-    sweeps, about = load_sweeps(path)
+    sweeps = load_measured(out / "tradeoff.json").of(capture)
     if budget:
         advice = within_budget(sweeps, parse_budget(budget))
+        asked = f"--budget {budget}"
     else:
         advice = with_quality(sweeps, quality)  # type: ignore[arg-type]
-    click.echo(f"expected on {about['scene']}: {advice.seconds:.1f} processor seconds")
-    for sweep in sweeps:
-        point = advice.chosen[sweep.knob]
+        asked = f"--quality {quality}"
+    click.echo(f"expected on capture {capture}: {advice.seconds:.1f} processor seconds")
+    for expected in advice.works:
         click.echo(
-            f"  {sweep.knob}: {point.label}  ({point.seconds:.2f} s, {sweep.error_name} "
-            f"{point.error:.4g})"
+            f"  {expected.work}: {expected.seconds:.2f} s, {expected.error_name} "
+            f"{expected.error:.4g}"
         )
+        for knob, label in expected.labels.items():
+            click.echo(f"    {knob}: {label}")
     click.echo("in params.yaml:")
     for name, value in sorted(advice.settings.items()):
         click.echo(f"  {name}: {'null' if value is None else value}")
+    if trying:
+        _try(artifacts, capture, out, advice, asked)
 
 
-def _about(capture: str) -> dict[str, str]:
+def _try(artifacts: Path, capture: str, out: Path, advice: Advice, asked: str) -> None:
+    from luxcore.tradeoff.advise import try_out
+    from luxcore.tradeoff.knobs import KNOBS
+    from luxcore.tradeoff.page import write_tradeoffs
+    from luxcore.tradeoff.store import load_measured, with_trial
+
+    with tempfile.TemporaryDirectory(prefix="lux-tradeoff-") as scratch:
+        trial = try_out(advice, asked, KNOBS, _bench(artifacts, Path(scratch), capture))
+    click.echo(f"obtained: {trial.obtained_s:.1f} processor seconds")
+    for tried in trial.works:
+        click.echo(
+            f"  {tried.work}: {tried.obtained.cpu_s:.2f} s, error {tried.obtained.error:.4g}"
+        )
+    page = write_tradeoffs(out, with_trial(load_measured(out / "tradeoff.json"), trial))
+    click.echo(f"{page}")
+
+
+def _bench(artifacts: Path, scratch: Path, capture: str) -> Bench:
+    from luxcore.settings.project import ProjectSettings
+    from luxcore.tradeoff.knob import Bench
+
+    return Bench(artifacts, scratch, ProjectSettings(), capture)
+
+
+def _about() -> dict[str, str]:
     import os
     import platform
 
-    machine = f"{os.cpu_count()} cores ({platform.machine()})"
-    return {"scene": f"capture {capture}", "machine": machine}
+    return {"machine": f"{os.cpu_count()} cores ({platform.machine()})"}

@@ -22,7 +22,7 @@ class Bench:
     scratch: Path
     params: ProjectSettings
     capture: str
-    """Id of the capture; the demo room has known truth."""
+    """Id of the capture; a rendered room has known truth, photos have not."""
 
     def input(self, stage: str) -> Path:
         """The capture's folder of a stage. Raises InputError where it has not run."""
@@ -48,12 +48,19 @@ class Choice:
     label: str
     settings: dict[str, Any]
 
+    def section(self, name: str) -> dict[str, Any]:
+        """The settings of one section of params.yaml, without its name."""
+        prefix = f"{name}."
+        return {k.removeprefix(prefix): v for k, v in self.settings.items() if k.startswith(prefix)}
+
 
 @dataclass(frozen=True)
 class Knob:
     """`run(prepared, choice, repeat)` does the work once and says how long and how wrong it was."""
 
     name: str
+    work: str
+    """What is done. The first knob of a work can run it with the settings of all its knobs."""
     choices: tuple[Choice, ...]
     error: str
     """What the error is, with its unit; smaller is better."""

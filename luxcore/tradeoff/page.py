@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import jinja2
 
 from luxcore.files.atomic import atomic_file
-from luxcore.tradeoff.sweep import Sweep, dominating, front, save_sweeps
+from luxcore.tradeoff.store import Measured, save_measured
+from luxcore.tradeoff.sweep import Point, Sweep, dominating, front
 
 ZERO_SHOWN = 1e-6
 """Where an error of zero is drawn: a logarithmic axis has no zero."""
 
 
-def write_tradeoffs(out: Path, sweeps: Sequence[Sweep], about: dict[str, Any]) -> Path:
-    """Write `out`/tradeoff.html, tradeoff.json and one SVG per knob; returns the page."""
-    save_sweeps(out / "tradeoff.json", sweeps, about)
-    for index, sweep in enumerate(sweeps):
-        with atomic_file(out / f"tradeoff-{index:02d}.svg") as temporary:
+@dataclass(frozen=True)
+class Shown:
+    """A sweep and what the page says of it."""
+
+    sweep: Sweep
+    picture: str
+    best: frozenset[str]
+    beaten_by: tuple[str, ...]
+
+    @staticmethod
+    def of(sweep: Sweep, picture: str) -> Shown:
+        best = frozenset(point.label for point in front(sweep.points))
+        return Shown(sweep, picture, best, tuple(point.label for point in dominating(sweep)))
+
+
+def write_tradeoffs(out: Path, measured: Measured) -> Path:
+    """Write `out`/tradeoff.html, tradeoff.json and one SVG per knob and capture; the page."""
+    save_measured(out / "tradeoff.json", measured)
+    knobs: dict[str, list[Shown]] = {}
+    for sweep in measured.sweeps:
+        shown = Shown.of(sweep, f"{_slug(sweep.knob)}-{_slug(sweep.scene)}.svg")
+        with atomic_file(out / shown.picture) as temporary:
             draw(temporary, sweep)
+        knobs.setdefault(sweep.knob, []).append(shown)
+    _remove_stale(out, {shown.picture for group in knobs.values() for shown in group})
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
         undefined=jinja2.StrictUndefined,
@@ -29,10 +49,10 @@ def write_tradeoffs(out: Path, sweeps: Sequence[Sweep], about: dict[str, Any]) -
         lstrip_blocks=True,
     )
     text = environment.get_template("tradeoff.html").render(
-        sweeps=sweeps,
-        about=about,
-        best=[{p.label for p in front(s.points)} for s in sweeps],
-        beaten=[[p.label for p in dominating(s)] for s in sweeps],
+        knobs=knobs,
+        about=measured.about,
+        trials=measured.trials,
+        scenes=sorted({sweep.scene for sweep in measured.sweeps}),
     )
     with atomic_file(out / "tradeoff.html") as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -43,7 +63,10 @@ def draw(path: Path, sweep: Sweep) -> None:
     """Error against processor seconds: medians, the range of repeats, the front, the default."""
     import matplotlib
 
-    with matplotlib.rc_context({"svg.hashsalt": "luxremix", "font.size": 9}):
+    # Letters as text: their outlines would be most of the file.
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "luxremix", "svg.fonttype": "none", "font.size": 9}
+    ):
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(6.0, 3.6), layout="constrained")
@@ -55,13 +78,24 @@ def draw(path: Path, sweep: Sweep) -> None:
         for point in sweep.points:
             _draw_point(plot, point, is_default=point.label == sweep.default)
         plot.set(xscale="log", yscale="log", xlabel="processor time, s", ylabel=sweep.error_name)
-        plot.margins(0.15)
+        _spread_ticks(plot)
+        plot.margins(0.2)
         plot.grid(alpha=0.2, which="both")
         plot.spines[["top", "right"]].set_visible(False)
         figure.savefig(path, format="svg", metadata={"Date": None})
 
 
-def _draw_point(plot: Any, point: Any, *, is_default: bool) -> None:
+def _spread_ticks(plot: Any) -> None:
+    """A few plain numbers on each axis, also where the data spans less than a decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for axis in (plot.xaxis, plot.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=9))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _draw_point(plot: Any, point: Point, *, is_default: bool) -> None:
     x, y = point.seconds, _shown(point.error)
     colour = "#9a5b00" if is_default else "#555"
     bars = (
@@ -76,3 +110,15 @@ def _draw_point(plot: Any, point: Any, *, is_default: bool) -> None:
 
 def _shown(error: float) -> float:
     return max(error, ZERO_SHOWN)
+
+
+def _slug(name: str) -> str:
+    kept = "".join(letter if letter.isascii() and letter.isalnum() else " " for letter in name)
+    return "-".join(kept.lower().split())
+
+
+def _remove_stale(out: Path, pictures: set[str]) -> None:
+    """Curves of knobs that are no more."""
+    for path in out.glob("*.svg"):
+        if path.name not in pictures:
+            path.unlink()

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
-from luxcore.errors import FormatError, InputError
-from luxcore.files.atomic import write_json
 from luxcore.progress import progress
 from luxcore.tradeoff.knob import Bench, Knob, Work
-
-VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -45,9 +39,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One knob, measured."""
+    """One knob, measured on one capture."""
 
+    scene: str
+    """Id of the capture."""
     knob: str
+    work: str
     error_name: str
     why: str
     default: str
@@ -56,6 +53,11 @@ class Sweep:
     def point(self, label: str) -> Point:
         """The point of a choice."""
         return next(point for point in self.points if point.label == label)
+
+    @property
+    def can_be_set(self) -> bool:
+        """Whether params.yaml has this knob; others are built in."""
+        return all(point.settings for point in self.points)
 
 
 def measure(knob: Knob, bench: Bench, repeats: int, *, quiet: bool = False) -> Sweep:
@@ -71,7 +73,8 @@ def measure(knob: Knob, bench: Bench, repeats: int, *, quiet: bool = False) -> S
                 works[choice.label].append(knob.run(prepared, choice, repeat))
                 bar.advance(1, choice=choice.label)
     points = tuple(Point(c.label, c.settings, tuple(works[c.label])) for c in knob.choices)
-    return Sweep(knob.name, knob.error, knob.why, knob.default(bench.params), points)
+    default = knob.default(bench.params)
+    return Sweep(bench.capture, knob.name, knob.work, knob.error, knob.why, default, points)
 
 
 def front(points: Sequence[Point]) -> list[Point]:
@@ -94,47 +97,6 @@ def dominating(sweep: Sweep) -> list[Point]:
         if point.seconds_range[1] < default.seconds_range[0]
         and point.error_range[1] < default.error_range[0]
     ]
-
-
-def save_sweeps(path: Path, sweeps: Sequence[Sweep], about: dict[str, Any]) -> None:
-    """Write all measurements; `about` says on what."""
-    write_json(path, {"version": VERSION, "about": about, "sweeps": [asdict(s) for s in sweeps]})
-
-
-def load_sweeps(path: Path) -> tuple[list[Sweep], dict[str, Any]]:
-    """Sweeps and what they were measured on. Raises InputError or FormatError naming the file."""
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: `lux tradeoff` measures it.")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        if data["version"] != VERSION:
-            raise FormatError(f"{path} is of version {data['version']}, not {VERSION}.")
-        return [_sweep(record) for record in data["sweeps"]], data["about"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise FormatError(f"{path} does not hold sweeps: {error!r}.") from error
-
-
-def merged(
-    path: Path, fresh: Sequence[Sweep], about: dict[str, Any], order: Sequence[str]
-) -> list[Sweep]:
-    """`fresh` and those sweeps of `path` that were measured on the same thing, in `order`."""
-    kept: list[Sweep] = []
-    if path.is_file():
-        old, old_about = load_sweeps(path)
-        kept = old if old_about == about else []
-    latest = {sweep.knob: sweep for sweep in (*kept, *fresh)}
-    return [latest[name] for name in order if name in latest]
-
-
-def _sweep(record: dict[str, Any]) -> Sweep:
-    points = tuple(
-        Point(p["label"], p["settings"], tuple(Work(**work) for work in p["works"]))
-        for p in record["points"]
-    )
-    knob, error_name, why, default = (
-        str(record[name]) for name in ("knob", "error_name", "why", "default")
-    )
-    return Sweep(knob, error_name, why, default, points)
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:

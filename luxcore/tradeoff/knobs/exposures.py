@@ -59,6 +59,7 @@ def _run(lights: list[_Light], choice: Choice, repeat: int) -> Work:
 
 BRACKETS = Knob(
     name="exposures merged for each lamp",
+    work="a lamp's exposures merged",
     choices=tuple(Choice(label, {}) for label in BRACKETS_EV),
     error="mean error, share of the lamp's light",
     why="One exposure loses the lamp itself; three hold it, as in the paper, and five cost half as "

@@ -1,4 +1,4 @@
-"""Photo resolution in the single-view model, views per pass in the multi-view model."""
+"""Photo resolution in the single-view model; views per pass and references in the multi-view."""
 
 from __future__ import annotations
 
@@ -67,16 +67,9 @@ def _prepare(bench: Bench) -> _Prepared:
 
 def _decompose(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
     bench = prepared.bench
-    settings = bench.params.decompose.model_copy(
-        update={"options": {"long_side_px": int(choice.label.split()[0])}}
-    )
     out = bench.scratch / "decompose"
-    shutil.rmtree(out, ignore_errors=True)
     with stopwatch() as watch:
-        decompose_capture(
-            bench.input("capture"), bench.input("masks"), bench.input("splat"), out, settings,
-            weights=_weights(bench, "train_sv"),
-        )  # fmt: skip
+        _take_apart(bench, choice, out)
     views = (
         (
             int(folder.name),
@@ -87,27 +80,36 @@ def _decompose(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
     return watch.work(prepared.truth.error(views))
 
 
+def _take_apart(bench: Bench, choice: Choice, out: Path) -> None:
+    settings = bench.params.decompose.model_copy(update=choice.section("decompose"))
+    shutil.rmtree(out, ignore_errors=True)
+    decompose_capture(
+        bench.input("capture"), bench.input("masks"), bench.input("splat"), out, settings,
+        weights=trained_weights(bench, "train_sv"),
+    )  # fmt: skip
+
+
 def _harmonize(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
+    """References taken apart and their light carried to all views."""
     bench = prepared.bench
-    settings = bench.params.harmonize.model_copy(
-        update={"views_per_pass": choice.settings["harmonize.views_per_pass"]}
-    )
+    settings = bench.params.harmonize.model_copy(update=choice.section("harmonize"))
     out = bench.scratch / "harmonize"
     shutil.rmtree(out, ignore_errors=True)
     # An empty store each time: a finished pass would be taken from it.
     store = bench.scratch / "units"
     shutil.rmtree(store, ignore_errors=True)
     with stopwatch() as watch:
+        _take_apart(bench, choice, bench.scratch / "references")
         harmonize_capture(
             bench.input("capture"), bench.input("masks"), bench.input("splat"),
-            bench.input("decompose"), out, settings, UnitStore(store),
-            weights=_weights(bench, "train_mv"),
+            bench.scratch / "references", out, settings, UnitStore(store),
+            weights=trained_weights(bench, "train_mv"),
         )  # fmt: skip
     files = sorted((out / "direct").glob("*.exr"))
     return watch.work(prepared.truth.error((int(f.stem), read_exr(f)) for f in files))
 
 
-def _weights(bench: Bench, stage: str) -> Path | None:
+def trained_weights(bench: Bench, stage: str) -> Path | None:
     """The weights that the run trained, else those that are shipped."""
     path = bench.artifacts / stage / "model.safetensors"
     return path if path.is_file() else None
@@ -115,6 +117,7 @@ def _weights(bench: Bench, stage: str) -> Path | None:
 
 PHOTO_SIZE = Knob(
     name="photo resolution in decomposition",
+    work="references taken apart",
     choices=tuple(
         Choice(f"{n} px", {"decompose.options": {"long_side_px": n}}) for n in (96, 160, 256, 320)
     ),
@@ -128,10 +131,22 @@ PHOTO_SIZE = Knob(
 
 VIEWS_PER_PASS = Knob(
     name="views per pass in harmonization",
+    work="light carried to all views",
     choices=tuple(Choice(str(n), {"harmonize.views_per_pass": n}) for n in (4, 8, 15)),
     error=ERROR,
     why="More views in one pass agree better and share the references' cost; 15 is the most that "
     "the paper's memory holds.",
+    prepare=_prepare,
+    run=_harmonize,
+)
+
+REFERENCES = Knob(
+    name="reference views of a lamp",
+    work="light carried to all views",
+    choices=tuple(Choice(str(n), {"decompose.references_per_lamp": n}) for n in (1, 2, 3)),
+    error=ERROR,
+    why="A second reference must be taken apart, carried along in every pass and disagrees with "
+    "the first; one is the paper's choice.",
     prepare=_prepare,
     run=_harmonize,
 )

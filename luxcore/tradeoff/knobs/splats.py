@@ -44,8 +44,7 @@ def _prepare_fit(**changes: Any) -> Callable[[Bench], _Fit]:
 
 
 def _fit(prepared: _Fit, choice: Choice, repeat: int) -> Work:
-    changes = {name.removeprefix("splat."): value for name, value in choice.settings.items()}
-    settings = prepared.settings.model_copy(update=changes)
+    settings = prepared.settings.model_copy(update=choice.section("splat"))
     with stopwatch() as watch:
         result = fit_geometry(
             prepared.capture,
@@ -71,6 +70,7 @@ ERROR = "RMS error of held-out views, display 0..1"
 
 ITERATIONS = Knob(
     name="iterations of stage 1",
+    work="geometry fitted",
     choices=tuple(
         Choice(str(n), {"splat.iterations": n})
         for n in around(SplatSettings().iterations, 0.125, 0.25, 0.5, 1, 2)
@@ -83,6 +83,7 @@ ITERATIONS = Knob(
 
 GAUSSIANS = Knob(
     name="number of Gaussians",
+    work="geometry fitted",
     choices=tuple(
         Choice(f"{n:,}", {"splat.max_gaussians": n})
         for n in around(SplatSettings().max_gaussians, 1 / 16, 0.125, 0.25, 0.5, 1)
@@ -96,6 +97,7 @@ GAUSSIANS = Knob(
 
 HARMONICS = Knob(
     name="spherical harmonics",
+    work="geometry fitted",
     choices=(
         Choice("degree 0", {"splat.sh_degree": 0}),
         Choice("degree 1", {"splat.sh_degree": 1}),
@@ -157,6 +159,7 @@ def _run_cut_off(prepared: _Drawn, choice: Choice, repeat: int) -> Work:
 
 CUT_OFF = Knob(
     name="alpha cut-off",
+    work="a picture drawn",
     choices=tuple(Choice(f"1/{n}", {}) for n in (4096, 1024, 255, 64, 16)),
     error="RMS error of the picture, display 0..1",
     why="A contribution below one 8-bit step cannot be seen; a higher cut-off draws edges.",
@@ -185,8 +188,7 @@ def _prepare_lights(**changes: Any) -> Callable[[Bench], _Lights]:
 
 
 def _fit_lights(prepared: _Lights, choice: Choice, repeat: int) -> Work:
-    changes = {name.removeprefix("relight."): value for name, value in choice.settings.items()}
-    settings = prepared.settings.model_copy(update=changes)
+    settings = prepared.settings.model_copy(update=choice.section("relight"))
     with stopwatch() as watch:
         result = fit_lights(
             prepared.capture, *prepared.folders, prepared.scratch / "relight", settings,
@@ -197,6 +199,7 @@ def _fit_lights(prepared: _Lights, choice: Choice, repeat: int) -> Work:
 
 LIGHT_STEPS = Knob(
     name="iterations of light on frozen geometry",
+    work="lights fitted",
     choices=tuple(
         Choice(str(n), {"relight.frozen_iterations": n})
         for n in around(RelightSettings().frozen_iterations, 0.25, 0.5, 1, 2)
@@ -209,6 +212,7 @@ LIGHT_STEPS = Knob(
 
 CACHE = Knob(
     name="cached blending weights",
+    work="lights fitted",
     choices=(
         Choice("cached", {"relight.max_baked_mb": RelightSettings().max_baked_mb}),
         Choice("rasterized every time", {"relight.max_baked_mb": 0}),
