@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from benchmarks.splat_scenes import BenchmarkScene
+from luxcore.splats.baked import bake
 from luxcore.splats.device import Device
 from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 
@@ -41,6 +42,17 @@ def measure(call: Callable[[], object], repeats: int = 9, warm_up: int = 2) -> T
         cpu.append(1e3 * (time.process_time() - start[0]))
         wall.append(1e3 * (time.perf_counter() - start[1]))
     return Timing(float(np.median(cpu)), float(np.median(wall)), min(cpu))
+
+
+def interleaved(calls: Mapping[str, Callable[[], object]], repeats: int = 11) -> dict[str, float]:
+    """Median CPU milliseconds of each call, all called in turn, so that ratios share the noise."""
+    spent: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(repeats + 2):
+        for name, call in calls.items():
+            start = time.process_time()
+            call()
+            spent[name].append(1e3 * (time.process_time() - start))
+    return {name: float(np.median(values[2:])) for name, values in spent.items()}
 
 
 class TimedDevice(Device):
@@ -110,14 +122,7 @@ class Pass:
 
     def contributions(self) -> int:
         """(Gaussian, pixel) pairs that were blended."""
-        camera, saved = self.scene.camera, self.out.saved
-        kernels = self.device.program("bake", RasterConfig(channels=1).defines())
-        counts = self.device.zeros((camera.height * camera.width,), np.int32)
-        size = np.array([camera.width, camera.height], np.int32)
-        blocks = -(-camera.width // 4) * -(-camera.height // 4)
-        lists = (saved.ranges, saved.sorted_ids, saved.records)
-        self.device.launch(kernels.weights_count, blocks, size, *lists, counts)
-        return int(counts.get().astype(np.int64).sum())
+        return bake(self.device, self.out).nonzeros
 
 
 def machine_limits(device: Device) -> tuple[float, float]:

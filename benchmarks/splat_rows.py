@@ -15,6 +15,7 @@ from benchmarks.splat_measure import (
     BACKWARD_FLOP,
     FORWARD_FLOP,
     Pass,
+    interleaved,
     machine_limits,
     measure,
 )
@@ -88,31 +89,38 @@ def kernel_rows(device: Device, scene: BenchmarkScene) -> dict[str, Any]:
 
 
 def frozen_row(device: Device, scene: BenchmarkScene) -> dict[str, float]:
-    """8 lamps, frozen geometry: through the same lists, and as a sparse matrix of weights."""
-    run = Pass.prepare(device, scene, 3 * LAMPS)
+    """8 lamps, frozen geometry, beside one lamp's pass: the same lists, and baked weights."""
+    one, run = Pass.prepare(device, scene), Pass.prepare(device, scene, 3 * LAMPS)
     height, width, channels = run.out.image.shape
-    baked = bake(device, run.out)
     lights = padded(device, run.arrays[4].get())
     image = padded_zeros(device, height * width, (height, width, channels))
     d_image = padded_zeros(device, height * width, (height, width, channels))
     d_image.set(run.d_image.get())
-    d_lights = padded_zeros(device, len(scene.means), (len(scene.means), channels))
-    calls: dict[str, Callable[[], object]] = {
-        "recolor_cpu_ms": lambda: run.rasterizer.recolor(run.out, run.arrays[4]),
-        "color_gradients_cpu_ms": lambda: run.rasterizer.color_gradients(run.out, run.d_image),
-        "matrix_render_cpu_ms": lambda: baked.render(lights, image),
-        "matrix_gather_cpu_ms": lambda: baked.gather(d_image, d_lights),
-    }
+    d_lights = device.empty((len(scene.means), channels))
+    baked = bake(device, run.out)
 
-    def waited(call: Callable[[], object]) -> Callable[[], None]:
+    def waited(call: Callable[..., object], *arguments: Any) -> Callable[[], None]:
         def wait() -> None:
-            call()
+            call(*arguments)
             device.queue.finish()
 
         return wait
 
-    row = {name: measure(waited(call)).cpu_ms for name, call in calls.items()}
-    return row | {"matrix_mb": baked.entries * 16 / 1e6}
+    calls = {
+        "one_lamp_forward": one.forward,
+        "one_lamp_backward": one.backward,
+        "recolor": waited(run.rasterizer.recolor, run.out, run.arrays[4]),
+        "color_gradients": waited(run.rasterizer.color_gradients, run.out, run.d_image),
+        "baked_render": waited(baked.render, lights, image),
+        "baked_gather": waited(baked.gather, d_image, d_lights),
+        "bake": waited(bake, device, run.out),
+    }
+    row = interleaved(calls)
+    return {f"{name}_cpu_ms": value for name, value in row.items()} | {
+        "baked_mb": baked.nbytes / 1e6,
+        "forward_ratio": row["baked_render"] / row["one_lamp_forward"],
+        "backward_ratio": row["baked_gather"] / row["one_lamp_backward"],
+    }
 
 
 def memory_row(device: Device, scene: BenchmarkScene) -> dict[str, float]:

@@ -99,7 +99,7 @@ def print_report(report: dict[str, Any]) -> None:
         ]
         print(f"{curve:10s}", "  ".join(cells))
     for name in ("frozen_8_lamps", "relight_8_lamps", "memory", "million_1080p"):
-        print(f"{name}:", {k: round(v, 1) for k, v in (report[name] or {}).items()})
+        print(f"{name}:", {k: round(v, 2) for k, v in (report[name] or {}).items()})
     print("digest:", report["digest"])
     print(summary(report))
 
@@ -121,6 +121,7 @@ def summary(report: dict[str, Any]) -> str:
     opensplat = PUBLISHED["OpenSplat CPU mode, published comparison"]
     assert isinstance(opensplat, dict)
     forward, backward = lamp_ratio(report)
+    frozen = report["frozen_8_lamps"]
     torch_rows = {r["scene"]: r for r in report["torch"]}
     beside = torch_rows.get(row["scene"], report["torch"][0])
     own = next(r for r in report["engine"] if r["scene"] == beside["scene"])
@@ -131,7 +132,8 @@ def summary(report: dict[str, Any]) -> str:
         f"{opensplat['backward'] / row['backward_cpu_ms']:.1f}x; torch over this "
         f"{beside['forward_cpu_ms'] / own['forward_cpu_ms']:.0f}x / "
         f"{beside['backward_cpu_ms'] / own['backward_cpu_ms']:.0f}x; "
-        f"8 lamps {forward:.2f}x / {backward:.2f}x of one"
+        f"8 lamps {forward:.2f}x / {backward:.2f}x of one, with baked weights "
+        f"{frozen['forward_ratio']:.2f}x / {frozen['backward_ratio']:.2f}x"
     )
 
 

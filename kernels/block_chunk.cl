@@ -3,7 +3,7 @@
 // For the block mapping only. A tile is 4x4 blocks of 4x4 pixels; lane i of a float16 is pixel
 // (i % 4, i / 4) of a block. Coverage is exact: for each row of blocks, the widest chord of the
 // ellipse alpha >= ALPHA_MIN within it. 16 Gaussians are tested at once, one per lane.
-// Compile-time: CHUNK (a multiple of 32), FEATURES (floats blended per Gaussian).
+// Compile-time: CHUNK (a multiple of 32), FEATURES (floats blended per Gaussian, may be 0).
 #include "blending.cl"
 #line 9 "block_chunk.cl"
 
@@ -16,7 +16,9 @@
 
 typedef struct {
   float8 record[CHUNK];
+#if FEATURES
   float features[CHUNK * FEATURES];  // colours, then depth
+#endif
   int blocks[CHUNK];                 // bit b: block b is reached
 } Chunk;
 
@@ -52,20 +54,52 @@ int16 reached_blocks(const float8 *record, const float x0, const float y0) {
 }
 
 // Gathers the Gaussians sorted_ids[begin .. begin + count) and finds their blocks.
+void load_records(Chunk *chunk, const int begin, const int count, const float x0, const float y0,
+                  __global const int *sorted_ids, __global const float *records) {
+  for (int i = 0; i < count; ++i) chunk->record[i] = vload8(sorted_ids[begin + i], records);
+  for (int i = 0; i < count; i += 16)
+    vstore16(i + LANES < count ? reached_blocks(chunk->record + i, x0, y0) : (int16)(0), 0,
+             chunk->blocks + i);
+}
+
+#if FEATURES
+// The same, with what is blended.
 void load_chunk(Chunk *chunk, const int begin, const int count, const float x0, const float y0,
                 __global const int *sorted_ids, __global const float *records,
                 __global const float *colors) {
   for (int i = 0; i < count; ++i) {
     const int g = sorted_ids[begin + i];
-    const float8 record = vload8(g, records);
-    chunk->record[i] = record;
     for (int k = 0; k < CHANNELS; ++k)
       chunk->features[i * FEATURES + k] = colors[(size_t)g * CHANNELS + k];
 #if FEATURES > CHANNELS
-    chunk->features[i * FEATURES + CHANNELS] = RECORD_DEPTH(record);
+    chunk->features[i * FEATURES + CHANNELS] = records[(size_t)g * 8 + 6];
 #endif
   }
-  for (int i = 0; i < count; i += 16)
-    vstore16(i + LANES < count ? reached_blocks(chunk->record + i, x0, y0) : (int16)(0), 0,
-             chunk->blocks + i);
+  load_records(chunk, begin, count, x0, y0, sorted_ids, records);
+}
+#endif
+
+// bits[b]: bit i says that Gaussian i of these 32 reaches block b.
+uint16 transpose_bits(const int *blocks) {
+  uint16 bits = (uint16)(0);
+  for (int i = 0; i < 32; ++i)
+    bits = (bits >> 1) | (((uint16)(blocks[i]) >> convert_uint16(LANES)) << 31);
+  return bits;
+}
+
+// bits[word][b]: bit i says that Gaussian 32 word + i of the chunk's `count` reaches block b.
+inline void list_by_block(Chunk *chunk, const int count, uint bits[CHUNK_WORDS][BLOCKS]) {
+  for (int i = (count + 15) & ~15; i < CHUNK; ++i) chunk->blocks[i] = 0;
+  for (int word = 0; word < CHUNK_WORDS; ++word)
+    vstore16(transpose_bits(chunk->blocks + 32 * word), 0, bits[word]);
+}
+
+// The weight of a block's next Gaussian, 0 where it is not drawn. T is 0 once a pixel is finished.
+inline float16 next_weight(float16 *T, const float8 r, const float16 px, const float16 py) {
+  const float16 alpha = alpha_block(log2_alpha_block(r, RECORD_X(r) - px, RECORD_Y(r) - py));
+  const float16 after = fma(-alpha, *T, *T);
+  const int16 drawn = after >= TRANSMITTANCE_MIN;
+  const float16 weight = drawn ? alpha * *T : (float16)(0.0f);
+  *T = drawn ? after : (float16)(0.0f);
+  return weight;
 }

@@ -154,7 +154,11 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
   int open = 0xffff;  // bit b: block b has unfinished pixels
   for (int begin = ranges[tile].x; begin < end; begin += CHUNK) {
     const int count = min(CHUNK, end - begin);
+#if COLORS_ONLY
+    load_records(&chunk, begin, count, x0, y0, sorted_ids, records);
+#else
     load_chunk(&chunk, begin, count, x0, y0, sorted_ids, records, colors);
+#endif
     for (int i = 0; i < count; ++i) {
       uint left = chunk.blocks[i] & open;
       if (!left) continue;

@@ -15,23 +15,9 @@ typedef struct {
   float16 features[FEATURES];  // sum of weight times feature
 } Block;
 
-// bits[b]: bit i says that Gaussian i of these 32 reaches block b.
-uint16 transpose_bits(const int *blocks) {
-  uint16 bits = (uint16)(0);
-  for (int i = 0; i < 32; ++i)
-    bits = (bits >> 1) | (((uint16)(blocks[i]) >> convert_uint16(LANES)) << 31);
-  return bits;
-}
-
 inline void blend(Block *block, const Chunk *chunk, const int i, const float16 px,
                   const float16 py) {
-  const float8 r = chunk->record[i];
-  const float16 alpha =
-      alpha_block(log2_alpha_block(r, RECORD_X(r) - px, RECORD_Y(r) - py));
-  const float16 after = fma(-alpha, block->T, block->T);
-  const int16 drawn = after >= TRANSMITTANCE_MIN;
-  const float16 weight = drawn ? alpha * block->T : (float16)(0.0f);
-  block->T = drawn ? after : (float16)(0.0f);
+  const float16 weight = next_weight(&block->T, chunk->record[i], px, py);
   block->alpha += weight;
 #pragma unroll
   for (int k = 0; k < FEATURES; ++k)
@@ -76,10 +62,8 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_forward(
   for (; begin < range.y && open; begin += CHUNK) {
     const int count = min(CHUNK, range.y - begin);
     load_chunk(&chunk, begin, count, x0, y0, sorted_ids, records, colors);
-    for (int i = (count + 15) & ~15; i < CHUNK; ++i) chunk.blocks[i] = 0;
     uint bits[CHUNK_WORDS][BLOCKS];
-    for (int word = 0; word < CHUNK_WORDS; ++word)
-      vstore16(transpose_bits(chunk.blocks + 32 * word), 0, bits[word]);
+    list_by_block(&chunk, count, bits);
     for (int b = 0; b < BLOCKS; ++b) {
       if (!(open >> b & 1)) continue;
       Block block = blocks[b];

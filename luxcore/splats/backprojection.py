@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyopencl.array as cla
@@ -26,11 +26,13 @@ def backproject(
 ) -> Backprojection:
     """Gather `image` [h, w, c] with the weights of a forward pass of the same view.
 
-    The image is Σ_i w_ip c_i, so the derivative by c_i of Σ_p I_p · image_p is Σ_p w_ip I_p.
+    Colours have no part in it: the image is Σ_i w_ip c_i, so the derivative by c_i of
+    Σ_p I_p · image_p is Σ_p w_ip I_p.
     """
-    ones = device.zeros(image.shape) + np.float32(1)
-    sums = rasterizer.backward(out, image).colors.get()
-    return Backprojection(sums, rasterizer.backward(out, ones).colors.get()[:, 0])
+    alone = Rasterizer(device, replace(rasterizer.config, channels=1))
+    ones = device.zeros((*image.shape[:2], 1)) + np.float32(1)
+    sums = rasterizer.color_gradients(out, image).get()
+    return Backprojection(sums, alone.color_gradients(out, ones).get()[:, 0])
 
 
 def view_directions(

@@ -144,8 +144,8 @@ class LightFit:
             camera = self.views.cameras[view]
             out = self.rasterizer.forward(camera, *self.model.geometry, self.lights)
             self._compare(work, view, out.image)
-            gradients = self.rasterizer.backward(out, work.d_image)
-            d_lights, seen = gradients.colors, gradients.visible
+            d_lights = self.rasterizer.color_gradients(out, work.d_image)
+            seen = (out.radii > 0).astype(np.uint8)
         else:
             baked.render(self.lights, work.rendered)
             self._compare(work, view, work.rendered)
@@ -187,7 +187,7 @@ class LightFit:
             camera = self.views.cameras[view]
             out = self.rasterizer.forward(camera, *self.model.geometry, self.lights)
             self._baked[view] = bake(self.device, out)
-            self._baked_bytes += 16 * self._baked[view].entries
+            self._baked_bytes += self._baked[view].nbytes
         return self._baked.get(view)
 
     def _initial_lights(self) -> Float32[np.ndarray, "n m3"]:

@@ -10,7 +10,6 @@ import pytest
 from optim_room import (
     Room,
     make_room,
-    room_cameras,
     write_light_inputs,
     write_room_capture,
 )
@@ -22,12 +21,9 @@ from luxcore.files.exr import read_exr, write_exr
 from luxcore.light.agx import agx
 from luxcore.settings.relight import RelightSettings
 from luxcore.splats import stage2
-from luxcore.splats.baked import bake, padded, padded_zeros
-from luxcore.splats.device import open_device
 from luxcore.splats.light_views import light_units, read_exposure, toned_photo
 from luxcore.splats.losses.constants import CLIPPED
 from luxcore.splats.ply import read_ply, write_ply
-from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 from luxcore.splats.scene import load_scene
 from luxcore.splats.stage2 import Stage2Result, fit_lights
 
@@ -139,29 +135,6 @@ def test_killed_fit_resumes_to_the_same_bits(
     for name in ("splats.ply", "lights.safetensors", "scene.json", "curve.json", "metrics.json"):
         whole, resumed = (tmp_path / n / name for n in ("whole", "resumed"))
         assert whole.read_bytes() == resumed.read_bytes(), name
-
-
-def test_baked_view_is_the_rasterizer(room: Room) -> None:
-    """W · lights is the image to the bit, Wᵀ · d_image the gradient; edges and padding included."""
-    device, g = open_device(), room.gaussians
-    n = len(g)
-    lights = room.lights.reshape(n, -1)
-    camera = room_cameras(5, 37, 22)[1]
-    geometry = [device.array(a) for a in (g.means, g.quats, g.log_scales, g.opacity_logits)]
-    values = padded(device, lights)
-    rasterizer = Rasterizer(device, RasterConfig(channels=9))
-    out = rasterizer.forward(camera, *geometry, values)
-    view = bake(device, out)
-    image = padded_zeros(device, 37 * 22, (22, 37, 9))
-    view.render(values, image)
-    np.testing.assert_allclose(image.get(), out.image.get(), rtol=1e-6, atol=1e-7)
-    d_image = padded_zeros(device, 37 * 22, (22, 37, 9))
-    d_image.set(np.random.default_rng(0).normal(size=(22, 37, 9)).astype(np.float32))
-    gradient = device.empty((n, 9))
-    view.gather(d_image, gradient)
-    expected = rasterizer.backward(out, d_image).colors.get()
-    assert np.linalg.norm(gradient.get() - expected) < 1e-5 * np.linalg.norm(expected)
-    np.testing.assert_array_equal(view.visible.get() > 0, (expected != 0).any(axis=1))
 
 
 def test_one_bright_lamp_does_not_drown_the_rest() -> None:
