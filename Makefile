@@ -15,6 +15,11 @@ run: $(READY)
 test: $(READY) lint
 	. .ci/environment && $(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
+# Make the shipped weights anew (hours): rooms, then each network from those before it.
+WEIGHTS_DIR ?= weights-build
+weights: $(READY)
+	. .ci/environment && sh luxcore/models/small/recipe.sh $(WEIGHTS_DIR)
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

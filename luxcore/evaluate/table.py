@@ -10,9 +10,17 @@ import numpy as np
 
 from luxcore.files.atomic import atomic_file, write_json
 
-COLUMNS = ("psnr", "ssim", "lpips", "psnr_unscaled", "ssim_unscaled", "log_rmse")
-HEADINGS = ("PSNR", "SSIM", "LPIPS", "PSNR unscaled", "SSIM unscaled", "error in stops")
-DIGITS = (2, 3, 3, 2, 3, 2)
+COLUMNS = ("psnr", "ssim", "lpips", "psnr_picture", "psnr_unscaled", "ssim_unscaled", "log_rmse")
+HEADINGS = (
+    "PSNR",
+    "SSIM",
+    "LPIPS",
+    "PSNR, picture scaled",
+    "PSNR unscaled",
+    "SSIM unscaled",
+    "error in stops",
+)
+DIGITS = (2, 3, 3, 2, 2, 3, 2)
 
 PAPER_SINGLE = {
     "ScribbleLight": (14.39, 0.395, 0.688),

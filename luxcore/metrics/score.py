@@ -23,8 +23,10 @@ def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) ->
     `exposure` is the capture's g: images are AgX(g · I), both linear radiance. The scale is fitted
     where the true picture is not white: a glowing bulb of 500 times white, which every picture
     shows as white, would else decide over the whole room. Keys: psnr, ssim,
-    lpips (None where unavailable), psnr_unscaled, ssim_unscaled, log_rmse (stops, rescaled linear
-    HDR). Values of the prediction that are not finite count as black.
+    lpips (None where unavailable), psnr_picture (the scale fitted to the display images instead),
+    psnr_unscaled, ssim_unscaled, log_rmse (stops, rescaled linear HDR). The paper does not say
+    whether it scales light or pictures. Values of the prediction that are not finite count as
+    black.
     """
     predicted = np.nan_to_num(np.asarray(predicted_linear, np.float32), posinf=0.0, neginf=0.0)
     truth = np.asarray(truth_linear, np.float32)
@@ -34,6 +36,7 @@ def score_pair(predicted_linear: Image, truth_linear: Image, exposure: float) ->
         "psnr": psnr(picture, target),
         "ssim": ssim(picture, target),
         "lpips": lpips(picture, target),
+        "psnr_picture": psnr(np.clip(plain * picture_scale(plain, target), 0, 1), target),
         "psnr_unscaled": psnr(plain, target),
         "ssim_unscaled": ssim(plain, target),
         "log_rmse": log_rmse(scaled * exposure, truth * exposure),
@@ -45,6 +48,11 @@ def shown_scale(predicted: Image, truth: Image, exposure: float) -> Float[np.nda
     shown = truth.max(axis=-1) * exposure < LINEAR_CEILING
     scale = channel_scale(predicted[shown], truth[shown]) if shown.any() else np.ones(3)
     return scale.astype(np.float32)
+
+
+def picture_scale(plain: Image, target: Image) -> Float[np.ndarray, " 3"]:
+    """The channel-wise scale between two display images."""
+    return channel_scale(plain, target).astype(np.float32)
 
 
 def score_display(shown: Image, target: Image) -> dict:

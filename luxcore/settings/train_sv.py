@@ -12,6 +12,9 @@ class TrainingSettings(Settings):
 
     steps: int = Field(24, ge=0, le=1_000_000, description="optimizer steps; 0 keeps the base")
     photos_per_step: int = Field(4, ge=1, le=256, description="photos, with all their lamps")
+    rooms: int = Field(
+        0, ge=0, description="only the first so many rendered rooms; 0 takes all there are"
+    )
     groups: int = Field(12, ge=1, le=100_000, description="groups of photos cut from the renders")
     views_per_group: int = Field(3, ge=2, le=15, description="overlapping photos in a group")
     sketches: int = Field(

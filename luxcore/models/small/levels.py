@@ -19,3 +19,9 @@ def display_curve(linear: Tensor) -> Tensor:
     """
     response = (linear.clamp_min(0) / 0.2 + 1e-6) ** 0.85
     return response / (1 + response)
+
+
+def linear_of(shown: Tensor) -> Tensor:
+    """The inverse of `display_curve`; values from 1 on count as the photo's white."""
+    shown = shown.clamp(0, 0.999)
+    return 0.2 * (shown / (1 - shown)) ** (1 / 0.85)

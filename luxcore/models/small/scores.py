@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from torch import Tensor
@@ -24,12 +24,26 @@ def lamp_scores(net: UNet, cases: Sequence[tuple[Tensor, Example]]) -> dict[str,
 def mean_psnr(net: UNet, cases: Sequence[tuple[Tensor, Example]], *, on: bool = True) -> float:
     """Mean PSNR in dB of OLATs, AgX after a least-squares scale per channel, of the lamps that
     burn in the photo or of those that do not; NaN when there are none."""
+
+    def predict(features: Tensor, example: Example) -> Tensor:
+        fields = light_fields(net(features), example.on, example.warped)
+        return lamp_light(fields, example.photo, example.on)
+
+    return mean_psnr_of(predict, cases, on=on)
+
+
+def mean_psnr_of(
+    predict: Callable[[Tensor, Example], Tensor],
+    cases: Sequence[tuple[Tensor, Example]],
+    *,
+    on: bool,
+) -> float:
+    """`mean_psnr` of anything that gives linear light [k, 3, h, w] for a photo's lamps."""
     scores: list[Tensor] = []
     with torch.no_grad():
         for features, example in cases:
-            fields = light_fields(net(features), example.on, example.warped)
             asked = example.on == on
-            light = lamp_light(fields, example.photo, example.on)[asked]
+            light = predict(features, example)[asked]
             scores += [_psnr(p, t) for p, t in zip(light, example.lights[asked], strict=True)]
     return float(torch.stack(scores).mean()) if scores else float("nan")
 

@@ -29,6 +29,8 @@ STEPS = 20_000
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--base", default=None, help='Weights to start from, or "shipped".')
 @click.option("--steps", default=STEPS, show_default=True)
+@click.option("--rooms", default=0, help="Only the first so many rooms; 0: all.")
+@click.option("--photos", default=6, show_default=True, help="Photos a step, with all lamps.")
 @click.option("--groups", default=600, show_default=True, help="Groups cut from the renders.")
 @click.option("--sketches", default=300, show_default=True, help="Groups of sketched rooms.")
 @click.option("--size", default=96, show_default=True, help="Side of a photo in pixels.")
@@ -40,6 +42,8 @@ def main(
     out: Path,
     base: str | None,
     steps: int,
+    rooms: int,
+    photos: int,
     groups: int,
     sketches: int,
     size: int,
@@ -55,7 +59,8 @@ def main(
         "size_px": size,
         "rate": rate,
         "base": base,
-        "photos_per_step": 6,
+        "photos_per_step": photos,
+        "rooms": rooms,
         "check_every": 200,
         "validation_groups": 16,
         "cooldown": 0.4,

@@ -107,12 +107,14 @@ def train_mv(
 
 
 def pools(dataset_dir: Path, settings: TrainingSettings, seed: int) -> tuple[CropPool, CropPool]:
-    """(training, validation) photos: validation has the last rooms, where there are several."""
+    """(training, validation) photos: validation has the last tenth of the rooms, or other photos
+    where there is only one room."""
     stems = list_rendered(dataset_dir)
-    rooms = sorted({str(read_metadata(stem).get("room")) for stem in stems})
-    kept_rooms = max(1, len(rooms) - max(1, len(rooms) // 10)) if len(rooms) > 1 else 1
-    training = [s for s in stems if str(read_metadata(s).get("room")) in rooms[:kept_rooms]]
-    aside = [s for s in stems if s not in set(training)] or stems
+    room_of = {stem: str(read_metadata(stem).get("room")) for stem in stems}
+    rooms = sorted(set(room_of.values()))[: settings.rooms or None]
+    kept = rooms[: max(1, len(rooms) - max(1, len(rooms) // 10))]
+    training = [stem for stem in stems if room_of[stem] in kept]
+    aside = [stem for stem in stems if room_of[stem] in set(rooms) - set(kept)] or training
     size = (settings.size_px, settings.size_px)
     views = settings.views_per_group
     sets = MultiViewSets(training, size, seed, views_per_set=views, relit=False)

@@ -1,0 +1,30 @@
+#!/bin/sh
+# The shipped weights from nothing: `make weights`. A killed run goes on where it stopped.
+# Each network is trained at 64 px first, where steps are cheap, and ends at 96 px.
+set -eu
+out="$1"
+weights=luxcore/models/weights
+
+train() { # NAME KIND OPTIONS...
+    name="$1" kind="$2"
+    shift 2
+    python -m luxcore.models.small.train "$kind" --data "$out/rooms/train" --out "$out/$name" "$@"
+}
+
+install_weights() { cp "$out/$1/model.safetensors" "$weights/$2.safetensors"; }
+
+python -m luxcore.models.small.rooms --out "$out/rooms"
+cp "$out/rooms/manifest.json" "$weights/data_manifest.json"
+
+train geometry64 geometry --rooms 100 --groups 280 --sketches 0 --size 64 --photos 12 --steps 2400
+train geometry geometry --base "$out/geometry64/model.safetensors" --rooms 100 --groups 280 \
+    --sketches 0 --photos 12 --steps 600 --rate 5e-4
+install_weights geometry geometry
+
+train sv64 sv --rooms 200 --groups 600 --sketches 100 --size 64 --steps 9000
+train sv sv --base "$out/sv64/model.safetensors" --rooms 200 --groups 600 --sketches 100 \
+    --steps 2500 --rate 7e-4
+install_weights sv sv
+
+train mv mv --rooms 200 --groups 200 --sketches 60 --size 64 --photos 4 --steps 2000 --rate 1e-3
+install_weights mv mv
