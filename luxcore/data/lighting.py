@@ -42,7 +42,7 @@ def draw_relighting(rng: Generator, lamps: int) -> Relighting:
     This is the paper's composition I_full' = I_full + Σ c'_i · I_i (supplement, On-the-fly
     sampling) with c'_i = (on_i · gain_i − 1) · c_i, so lamps can also be dimmed and switched off.
     """
-    on = rng.random(lamps) < rng.choice([0.5, 0.8, 1.0])
+    on = rng.random(lamps) < rng.choice([0.3, 0.7, 1.0])
     power = np.exp(rng.normal(0.0, _POWER_SPREAD, (lamps, 1)))
     colours = np.ones((lamps, 3))
     for lamp in range(lamps):
