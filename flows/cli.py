@@ -1,4 +1,4 @@
-"""`lux run`, `lux plan`, `lux verify`, `lux schedule`."""
+"""`lux run`, `lux plan`, `lux verify`, `lux schedule`, `lux dashboards`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ def run(stages: tuple[str, ...], stages_at_once: int) -> None:
     """Run the flow: every stage that is stale, in order; all of them or only STAGES."""
     root = project_root()
     _check_names(stages)
+    from flows.prefect_settings import use_prefect_of
+
+    use_prefect_of(root)
     from flows.pipeline import run_pipeline
     from flows.summary import metrics_table
 
@@ -78,13 +81,39 @@ def verify(digests: bool, as_json: bool) -> None:
 @click.option("--cron", required=True, help='When, as in "0 3 * * *".')
 @click.argument("stages", nargs=-1)
 @click.option("--worktree", type=click.Path(path_type=Path), help="Where; beside the project.")
-def schedule(cron: str, stages: tuple[str, ...], worktree: Path | None) -> None:
-    """Run the flow on a cron schedule, in a git worktree of its own with the shared cache."""
+@click.option(
+    "--set", "changes", multiple=True, metavar="STAGE.NAME=VALUE",
+    help="A parameter for these runs alone, as in rooms.train=200.",
+)  # fmt: skip
+def schedule(
+    cron: str, stages: tuple[str, ...], worktree: Path | None, changes: tuple[str, ...]
+) -> None:
+    """Build STAGES and all they need (or everything) on a cron schedule, until interrupted.
+
+    Runs happen in a git worktree of its own at the project's present commit, with the project's
+    cache and finished units. A run that is due while another is going ends at once.
+    """
     root = project_root()
     _check_names(stages)
     from flows.schedule import serve
 
-    serve(root, cron, list(stages) or None, worktree)
+    serve(root, cron, list(stages) or None, worktree, list(changes))
+
+
+@click.command()
+@click.option("--mlflow-port", default=5000, show_default=True, type=click.IntRange(1, 65535))
+@click.option("--prefect-port", default=4200, show_default=True, type=click.IntRange(1, 65535))
+@click.option("--report-port", default=4300, show_default=True, type=click.IntRange(1, 65535))
+def dashboards(mlflow_port: int, prefect_port: int, report_port: int) -> None:
+    """Start mlflow's and Prefect's pages and the report, and print their addresses.
+
+    They listen on 127.0.0.1 only, and end with this command.
+    """
+    root = project_root()
+    from flows.dashboards import dashboards as servers
+    from flows.dashboards import serve_dashboards
+
+    serve_dashboards(root, servers(root, mlflow_port, prefect_port, report_port), click.echo)
 
 
 def project_root() -> Path:

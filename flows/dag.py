@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 
@@ -148,6 +149,12 @@ def ordered() -> tuple[Stage, ...]:
     """Stages in an order that respects `needs`; ties in the order written above."""
     graph = {stage.name: stage.needs for stage in STAGES}
     return tuple(BY_NAME[name] for name in TopologicalSorter(graph).static_order())
+
+
+def upstream(names: Iterable[str]) -> set[str]:
+    """Names of all stages that `names` depend on, directly or not."""
+    needed = {need for name in names for need in BY_NAME[name].needs}
+    return needed | upstream(needed) if needed else set()
 
 
 def downstream(name: str) -> set[str]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from luxcore.errors import LuxError
-from tasks.process import die_with_parent
+from luxcore.lifetime import die_with_parent
 
 BUSY_RETRY_S = 2.0
 BUSY = "is busy"

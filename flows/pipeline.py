@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-import os
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-# Prefect reads these at import; a run must not depend on a server elsewhere or phone home.
-os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
-os.environ.setdefault("DO_NOT_TRACK", "true")
-os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "600")
-os.environ.setdefault("PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW", "ignore")
-
 from prefect import flow, get_run_logger, task
-from prefect.artifacts import create_link_artifact, create_markdown_artifact
+from prefect.artifacts import (
+    create_link_artifact,
+    create_markdown_artifact,
+    create_progress_artifact,
+    update_progress_artifact,
+)
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
+from prefect.runtime import flow_run as current_run
 from prefect.states import Completed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows.dag import Stage, ordered
+from flows.dashboards import REPORT_PORT
 from flows.dvc_runner import reproduce, stale_stages
+from flows.living import live
+from flows.prefect_settings import prefect_home
+from flows.servers import HOST
 from flows.tracking import flow_run
 from luxcore.errors import LuxError
+from tasks.tracking import tracking_uri
 
 RETRY_DELAY_S = 5
+REPORT_ADDRESS = f"http://{HOST}:{REPORT_PORT}/index.html"
 _STATE_NAMES = {"ran": "Completed", "cached": "Cached", "unchanged": "Skipped"}
 
 
@@ -38,16 +44,28 @@ def stage_task(name: str, does: str, root: str, why: str) -> State:
     return Completed(name=_STATE_NAMES[outcome], message=why[:500])
 
 
-@flow(name="luxremix", persist_result=False, validate_parameters=False)
+def run_name() -> str:
+    """What a run is called in Prefect and in mlflow: what it builds, and since when."""
+    given = current_run.parameters or {}
+    names = given.get("targets") or given.get("stages") or ["everything"]
+    what = ", ".join(names) if len(names) < 4 else f"{len(names)} stages"
+    return f"{what}, {datetime.now():%Y-%m-%d %H:%M}"
+
+
+@flow(name="luxremix", flow_run_name=run_name, persist_result=False, validate_parameters=False)
 def pipeline(stages: list[str] | None = None, root: str = ".") -> list[str]:
     """All stages in order, or only `stages`; returns the names that ran or were skipped."""
     chosen = [stage for stage in ordered() if stages is None or stage.name in stages]
-    with flow_run(Path(root)):
+    place, name = Path(root), str(current_run.name)
+    note = live(prefect_home(place), str(current_run.id))
+    with flow_run(place, name) as parent:
+        note(tracking_uri(place.resolve()), parent.run_id)
         states = _submit(chosen, root)
-    failed = [name for name, state in states.items() if state.is_failed()]
-    _publish(Path(root), states)
-    if failed:
-        raise LuxError(f"the flow stopped: {_cause(states[failed[0]])}")
+        parent.log_outcome({name: state.name or "" for name, state in states.items()})
+        _publish(place, states)
+        failed = [name for name, state in states.items() if state.is_failed()]
+        if failed:
+            raise LuxError(f"the flow stopped: {_cause(states[failed[0]])}")
     return list(states)
 
 
@@ -70,10 +88,12 @@ def _submit(chosen: list[Stage], root: str) -> dict[str, State]:
             why,
             wait_for=[futures[name] for name in stage.needs if name in futures],
         )
+    bar: Any = create_progress_artifact(0.0, key="progress", description="Stages that are done")
     states: dict[str, State] = {}
     for name, future in futures.items():
         future.wait()
         states[name] = future.state
+        update_progress_artifact(bar, 100 * len(states) / len(futures))
     return states
 
 
@@ -83,12 +103,25 @@ def _upstream_reason(stage: Stage, stale: dict[str, str]) -> str:
 
 
 def _publish(root: Path, states: dict[str, State]) -> None:
-    rows = [f"| {name} | {state.name} | {state.message or ''} |" for name, state in states.items()]
+    rows = [f"| {name} | {state.name} | {_why(state)} |" for name, state in states.items()]
     table = "\n".join(["| stage | state | why |", "|---|---|---|", *rows])
     create_markdown_artifact(table, key="stages", description="What each stage did, and why")
     report = root.resolve() / "reports" / "index.html"
     if report.is_file():
-        create_link_artifact(report.as_uri(), key="report", link_text="The report of this run")
+        # Browsers let no page open a file: the link leads to the server of `lux dashboards`.
+        create_link_artifact(
+            REPORT_ADDRESS,
+            key="report",
+            link_text="The report",
+            description=f"Served by `lux dashboards`; the file is {report}",
+        )
+
+
+def _why(state: State) -> str:
+    reasons = str(state.message or "").split("; ")
+    # The first run of a project lists every file that it depends on.
+    more = f"; and {len(reasons) - 4} more" if len(reasons) > 4 else ""
+    return "; ".join(reasons[:4]) + more
 
 
 def _cause(state: State) -> str:

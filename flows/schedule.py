@@ -4,87 +4,119 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
-import time
-import urllib.request
 from pathlib import Path
 
-from luxcore.errors import LuxError
-from luxcore.ports import free_port
-from tasks.process import die_with_parent
+import yaml
 
-HOST = "127.0.0.1"
-SERVER_START_S = 120
+from flows.dag import ordered, upstream
+from flows.shared_server import kept_up, name_server
+from luxcore.errors import BusyError, InputError, LuxError
+from luxcore.files.atomic import atomic_file
+from luxcore.settings.load import parse_settings, read_yaml
+from tasks.process import stage_lock
+from tasks.tracking import tracking_uri
 
 
-def serve(root: Path, cron: str, stages: list[str] | None, worktree: Path | None) -> None:
-    """Serve the scheduled flow until interrupted. Starts a Prefect server where none is named."""
-    place = (worktree or root.parent / f"{root.name}-scheduled").resolve()
+def serve(
+    root: Path, cron: str, targets: list[str] | None, worktree: Path | None, changes: list[str]
+) -> None:
+    """Serve the scheduled flow until interrupted, on a Prefect server that is kept up.
+
+    `targets` are built with everything they need; `changes` are STAGE.NAME=VALUE for the
+    worktree's parameters. Raises InputError for what cannot be scheduled, before anything starts.
+    """
+    root = root.resolve()
+    changed_params(root / "params.yaml", changes)
+    server = name_server(root)
+    _check_cron(cron)
+    place = default_worktree(root) if worktree is None else worktree.resolve()
     prepare_worktree(root, place)
-    server = None if os.environ.get("PREFECT_API_URL") else start_server(root)
-    try:
-        from flows.scheduled import scheduled_run
+    name = "-".join(targets or ["everything"])
+    from flows.scheduled import clear_missed_runs, scheduled_run
 
-        print(f"runs at {cron!r} in {place}; pages at {os.environ['PREFECT_API_URL']}")
-        parameters = {"root": str(root), "worktree": str(place), "stages": stages}
-        scheduled_run.serve(name="scheduled", cron=cron, parameters=parameters)
-    finally:
-        if server is not None:
-            server.terminate()
+    try:
+        with stage_lock(root, f"schedule-{name}"), kept_up(server, root):
+            clear_missed_runs(name)
+            pages = os.environ["PREFECT_API_URL"].removesuffix("/api")
+            print(f"{name}: runs at {cron!r} in {place}; pages at {pages}", flush=True)
+            scheduled_run.serve(
+                name=name,
+                cron=cron,
+                parameters={
+                    "root": str(root),
+                    "worktree": str(place),
+                    "targets": targets,
+                    "changes": changes,
+                },
+                print_starting_message=False,
+            )
+    except BusyError as error:
+        raise LuxError(f"{name} is on a schedule already: {error}") from error
+
+
+def default_worktree(root: Path) -> Path:
+    """Beside the project."""
+    return root.parent / f"{root.name}-scheduled"
 
 
 def prepare_worktree(root: Path, place: Path) -> None:
     """A detached worktree at the project's present commit, using the project's DVC cache."""
     revision = _git(root, "rev-parse", "HEAD")
     if (place / ".git").exists():
-        _git(place, "checkout", "--quiet", "--detach", revision)
+        # Forced: what an earlier run left in tracked files is nobody's work.
+        _git(place, "checkout", "--quiet", "--force", "--detach", revision)
     else:
         _git(root, "worktree", "prune")
         _git(root, "worktree", "add", "--quiet", "--detach", str(place), revision)
-    local = place / ".dvc" / "config.local"
-    local.write_text(f"[cache]\n    dir = {root / '.dvc' / 'cache'}\n", encoding="utf-8")
+    with atomic_file(place / ".dvc" / "config.local") as local:
+        local.write_text(f"[cache]\n    dir = {root / '.dvc' / 'cache'}\n", encoding="utf-8")
 
 
-def run_in_worktree(root: Path, worktree: Path, stages: list[str] | None) -> str:
+def run_in_worktree(
+    root: Path, worktree: Path, targets: list[str] | None, changes: list[str]
+) -> str:
     """Bring the worktree's artifacts up to date with the project's present commit."""
     from flows.pipeline import pipeline
 
     prepare_worktree(root, worktree)
+    if changes:
+        params = changed_params(worktree / "params.yaml", changes)
+        with atomic_file(worktree / "params.yaml") as path:
+            path.write_text(params, encoding="utf-8")
     os.environ["LUX_UNITS"] = str(root / ".lux" / "units")
+    # Records of all runs are in one place, where `lux dashboards` looks.
+    os.environ["MLFLOW_TRACKING_URI"] = tracking_uri(root)
+    needed = None if targets is None else {*targets, *upstream(targets)}
+    stages = None if needed is None else [s.name for s in ordered() if s.name in needed]
     done = pipeline(stages, str(worktree))
     return f"{len(done)} stages are up to date in {worktree}."
 
 
-def start_server(root: Path) -> subprocess.Popen[bytes]:
-    """A Prefect server on loopback, named to this process through `PREFECT_API_URL`."""
-    port = free_port(HOST)
-    os.environ.setdefault("PREFECT_HOME", str(root / ".lux" / "prefect"))
-    command = [sys.executable, "-m", "prefect", "server", "start", "--host", HOST]
-    log = root / ".lux" / "prefect-server.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with open(log, "ab") as stream:
-        server = subprocess.Popen(
-            [*command, "--port", str(port)],
-            stdout=stream,
-            stderr=stream,
-            preexec_fn=die_with_parent,
-        )
-    url = f"http://{HOST}:{port}/api"
-    _wait_for(f"{url}/health", server, log)
-    os.environ["PREFECT_API_URL"] = url
-    return server
+def changed_params(path: Path, changes: list[str]) -> str:
+    """The YAML of `path` with STAGE.NAME=VALUE put in. Raises InputError naming what is wrong."""
+    values = read_yaml(path)
+    for change in changes:
+        where, equals, text = change.partition("=")
+        *sections, name = where.split(".")
+        place = values
+        for section in sections:
+            place = place.get(section) if isinstance(place, dict) else None
+        if not equals or not isinstance(place, dict):
+            raise InputError(f'--set takes STAGE.NAME=VALUE, got "{change}".')
+        place[name] = yaml.safe_load(text)
+    if changes:
+        parse_settings(values, "--set")
+    return yaml.safe_dump(values, sort_keys=False)
 
 
-def _wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:
-    deadline = time.monotonic() + SERVER_START_S
-    while time.monotonic() < deadline and server.poll() is None:
-        try:
-            with urllib.request.urlopen(url, timeout=2):
-                return
-        except OSError:
-            time.sleep(0.5)
-    server.terminate()
-    raise LuxError(f"the Prefect server did not start; its log is {log}.")
+def _check_cron(cron: str) -> None:
+    from prefect.client.schemas.schedules import CronSchedule
+    from pydantic import ValidationError
+
+    try:
+        CronSchedule(cron=cron)
+    except ValidationError as error:
+        raise InputError(f'--cron takes five fields as in "0 3 * * *", got "{cron}".') from error
 
 
 def _git(folder: Path, *arguments: str) -> str:

@@ -2,54 +2,84 @@
 
 from __future__ import annotations
 
+import signal
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
-from uuid import UUID
 
 from prefect import flow, get_run_logger
 from prefect.client.orchestration import get_client
-from prefect.client.schemas.filters import FlowFilter, FlowFilterName, FlowRunFilter
+from prefect.client.schemas.filters import (
+    DeploymentFilter,
+    DeploymentFilterName,
+    FlowFilter,
+    FlowFilterName,
+    FlowRunFilter,
+)
+from prefect.client.schemas.sorting import FlowRunSort
 from prefect.runtime import flow_run as current_run
-from prefect.states import Crashed, State
+from prefect.states import Cancelled, Completed, Crashed, State
 
+from flows.living import live
+from flows.pipeline import run_name
+from flows.prefect_settings import prefect_home
 from flows.schedule import run_in_worktree
 from luxcore.errors import BusyError
+from luxcore.lifetime import die_with_parent
 from tasks.process import stage_lock
 
 NAME = "luxremix-scheduled"
+PAGE = 200
+"""Prefect gives no more at once; it plans at most 100 runs of a deployment ahead."""
 
 
-@flow(name=NAME, persist_result=False, validate_parameters=False)
-def scheduled_run(root: str, worktree: str, stages: list[str] | None = None) -> str:
+@flow(name=NAME, flow_run_name=run_name, persist_result=False, validate_parameters=False)
+def scheduled_run(
+    root: str,
+    worktree: str,
+    targets: list[str] | None = None,
+    changes: list[str] | None = None,
+) -> State[Any]:
     """One scheduled run. Where the last is still running, say so and complete."""
-    logger = get_run_logger()
+    # Without this a killed `lux schedule` would leave a run that nobody sees. Not SIGTERM: Prefect
+    # would go on for minutes, reporting it to a server that is gone.
+    die_with_parent(signal.SIGKILL)
+    project, logger = Path(root), get_run_logger()
     try:
-        with stage_lock(Path(root), "schedule"):
-            for name in bury_dead_runs(str(current_run.id)):
-                logger.warning("run %s had died without a word; marked as crashed", name)
-            outcome = run_in_worktree(Path(root), Path(worktree), stages)
-    except BusyError as error:
-        outcome = f"the previous build is still going, this one ends: {error}"
+        with stage_lock(project, "schedule"):
+            live(prefect_home(project), str(current_run.id))
+            outcome = run_in_worktree(project, Path(worktree), targets, changes or [])
+    except BusyError:
+        outcome = "the previous build is still going, so this one ends without doing anything."
+        logger.info(outcome)
+        return Completed(name="Skipped", message=outcome)
     logger.info(outcome)
-    return outcome
+    return Completed(message=outcome)
 
 
-def bury_dead_runs(living: str) -> list[str]:
-    """Mark scheduled runs (and flows inside them) that a kill left "Running" as Crashed.
+def clear_missed_runs(deployment: str) -> None:
+    """Before a schedule is served: what an earlier server of it left behind comes to an end.
 
-    Only the holder of the schedule's lock may call this: whoever else says Running is dead.
+    Runs that were due while nothing listened are cancelled (they would all start at once), runs
+    that were being started when their server died are marked as crashed. Only who holds the lock
+    of the schedule may call this.
     """
-    running: Any = FlowRunFilter.model_validate({"state": {"type": {"any_": ["RUNNING"]}}})
+    due: Any = FlowRunFilter.model_validate({"state": {"type": {"any_": ["SCHEDULED", "PENDING"]}}})
+    of_deployment: Any = DeploymentFilter(name=DeploymentFilterName(any_=[deployment]))
+    now = datetime.now(UTC)
     with get_client(sync_client=True) as client:
-        ours = client.read_flow_runs(
-            flow_filter=FlowFilter(name=FlowFilterName(any_=[NAME])), flow_run_filter=running
+        runs = client.read_flow_runs(
+            flow_filter=FlowFilter(name=FlowFilterName(any_=[NAME])),
+            deployment_filter=of_deployment,
+            flow_run_filter=due,
+            sort=FlowRunSort.EXPECTED_START_TIME_ASC,
+            limit=PAGE,
         )
-        inner = [r for r in client.read_flow_runs(flow_run_filter=running) if r.parent_task_run_id]
-        dead = {run.id: run.name for run in [*ours, *inner] if str(run.id) != living}
-        for run_id in dead:
-            client.set_flow_run_state(UUID(str(run_id)), _crashed(), force=True)
-    return sorted(dead.values())
-
-
-def _crashed() -> State[Any]:
-    return Crashed(message="its process ended without a word")
+        for run in runs:
+            if run.state is not None and run.state.is_pending():
+                state: State[Any] = Crashed(message="its schedule ended before it began")
+            elif run.expected_start_time and run.expected_start_time < now:
+                state = Cancelled(message="missed: no schedule was being served")
+            else:
+                continue
+            client.set_flow_run_state(run.id, state, force=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import resource
 import shutil
 import sys
@@ -11,10 +12,12 @@ from pathlib import Path
 
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
+from luxcore.lifetime import die_with_parent
 from luxcore.settings.load import load_settings
 from luxcore.units.store import seal_folder
 from tasks.context import STAGE_NAMES, StageContext, metrics_file
-from tasks.process import die_with_parent, stage_lock
+from tasks.process import stage_lock
+from tasks.system_metrics import Sample, SystemSampler
 
 
 def main(arguments: list[str]) -> int:
@@ -35,14 +38,16 @@ def run_stage(name: str, root: Path) -> StageContext:
         shutil.rmtree(context.out, ignore_errors=True)
         context.out.mkdir(parents=True)
         start = time.monotonic()
-        importlib.import_module(f"tasks.{name}").run(context)
+        module = importlib.import_module(f"tasks.{name}")
+        with SystemSampler() as sampler:
+            module.run(context)
         seconds = time.monotonic() - start
         seal_folder(context.out)
-        _record(context, seconds)
+        _record(context, inspect.getdoc(module) or "", seconds, sampler.samples)
     return context
 
 
-def _record(context: StageContext, seconds: float) -> None:
+def _record(context: StageContext, does: str, seconds: float, samples: list[Sample]) -> None:
     from tasks.tracking import log_stage
 
     peak_mb = max(
@@ -52,7 +57,7 @@ def _record(context: StageContext, seconds: float) -> None:
     write_json(context.root / metrics_file(context.name), context.metrics)
     timings = {**context.timings, "wall_s": seconds, "peak_memory_mb": peak_mb}
     write_json(context.root / "artifacts" / "timings" / f"{context.name}.json", timings)
-    log_stage(context, seconds, peak_mb)
+    log_stage(context, does, seconds, peak_mb, samples)
     print(f"{context.name}: {seconds:.1f} s, {peak_mb:.0f} MB", file=sys.stderr)
 
 

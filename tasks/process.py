@@ -1,25 +1,14 @@
-"""What keeps a stage from outliving its parent or running twice."""
+"""What keeps a stage from running twice."""
 
 from __future__ import annotations
 
-import ctypes
 import fcntl
 import os
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from luxcore.errors import BusyError, LuxError
-
-_PR_SET_PDEATHSIG = 1
-
-
-def die_with_parent() -> None:
-    """Ask the kernel for SIGTERM when the parent ends: a stopped `dvc repro` leaves no orphan."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM) != 0:
-        raise LuxError(f"prctl failed: {os.strerror(ctypes.get_errno())}.")
+from luxcore.errors import BusyError
 
 
 @contextmanager

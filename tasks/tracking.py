@@ -2,42 +2,60 @@
 
 from __future__ import annotations
 
+import getpass
 import os
 import subprocess
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from luxcore.files.digests import tree_digest
+from luxcore.settings.base import Settings
 from tasks.context import StageContext
+from tasks.system_metrics import Sample
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.entities import Metric
 
 EXPERIMENT = "luxremix"
 MAX_PARAM_LENGTH = 500
 """mlflow refuses longer values."""
+MAX_BATCH = 1000
+"""mlflow refuses more metrics at once."""
+UNITS = (
+    "psnr, _db: decibels, higher is better. ssim: 0 to 1. lpips, log_rmse: lower is better. "
+    "_s: seconds. _mb: megabytes. _share: of all, 0 to 1. _deg: degrees."
+)
 
 
-def log_stage(context: StageContext, seconds: float, peak_mb: float) -> None:
-    """Write the stage's run to the tracking store."""
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    from mlflow import MlflowClient
+def log_stage(
+    context: StageContext, does: str, seconds: float, peak_mb: float, samples: list[Sample]
+) -> None:
+    """Write the stage's run to the tracking store, with the times at which it really ran."""
     from mlflow.entities import Metric, Param, RunTag
 
-    client = MlflowClient(tracking_uri(context.root))
-    experiment = client.get_experiment_by_name(EXPERIMENT)
-    experiment_id = experiment.experiment_id if experiment else client.create_experiment(EXPERIMENT)
-    tags = _tags(context)
-    run = client.create_run(experiment_id, run_name=context.name, tags=tags)
+    client = tracking_client(context.root)
     now = int(time.time() * 1000)
+    run = client.create_run(
+        experiment_id(client, context.root),
+        start_time=now - int(seconds * 1000),
+        run_name=context.name,
+        tags=_tags(context, does),
+    )
+    run_id = run.info.run_id
     values = {**context.metrics, "wall_s": seconds, "peak_memory_mb": peak_mb}
     metrics = [Metric(name, value, now, 0) for name, value in values.items()]
     metrics += [Metric(name, value, now, step) for name, value, step in context.series]
-    params = [Param(k, str(v)[:MAX_PARAM_LENGTH]) for k, v in _flat_params(context).items()]
-    digest = tree_digest([context.out], context.root)
-    client.log_batch(
-        run.info.run_id, metrics, params, [RunTag("artifact_sha256", digest)], synchronous=True
-    )
-    _log_pictures(client, run.info.run_id, context)
-    client.set_terminated(run.info.run_id)
+    for step, sample in enumerate(samples):
+        metrics += [Metric(n, v, sample.time_ms, step) for n, v in sample.values.items()]
+    settings = flat_settings(context.name, context.settings)
+    params = [Param(name, value) for name, value in {"seed": str(context.seed), **settings}.items()]
+    digest = RunTag("artifact_sha256", tree_digest([context.out], context.root))
+    client.log_batch(run_id, [], params, [digest], synchronous=True)
+    log_metrics(client, run_id, metrics)
+    _log_pictures(client, run_id, context)
+    client.set_terminated(run_id)
 
 
 def tracking_uri(root: Path) -> str:
@@ -45,39 +63,76 @@ def tracking_uri(root: Path) -> str:
     return os.environ.get("MLFLOW_TRACKING_URI", f"sqlite:///{root / 'mlflow.db'}")
 
 
+def tracking_client(root: Path) -> MlflowClient:
+    """A client of the project's tracking store."""
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    from mlflow import MlflowClient
+
+    return MlflowClient(tracking_uri(root))
+
+
+def experiment_id(client: MlflowClient, root: Path) -> str:
+    """The project's experiment, made where it is missing."""
+    experiment = client.get_experiment_by_name(EXPERIMENT)
+    if experiment is not None:
+        return str(experiment.experiment_id)
+    # Named, since mlflow would take the folder that the command happens to run in.
+    return str(client.create_experiment(EXPERIMENT, (root.resolve() / "mlruns").as_uri()))
+
+
+def log_metrics(client: MlflowClient, run_id: str, metrics: list[Metric]) -> None:
+    """As few batches as mlflow allows."""
+    for first in range(0, len(metrics), MAX_BATCH):
+        client.log_batch(run_id, metrics[first : first + MAX_BATCH], synchronous=True)
+
+
+def common_tags(root: Path, source: str, description: str) -> dict[str, str]:
+    """What mlflow's table shows of every run: who, which command, which revision, about what."""
+    return {
+        "git_revision": git_revision(root),
+        "mlflow.user": getpass.getuser(),
+        "mlflow.source.name": source,
+        "mlflow.source.type": "LOCAL",
+        "mlflow.source.git.commit": _git(root, "rev-parse", "HEAD"),
+        "mlflow.note.content": description,
+    }
+
+
 def git_revision(root: Path) -> str:
     """The commit that is checked out, with "-dirty" where tracked files were changed."""
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return done.stdout.strip() or "unknown"
+    return _git(root, "describe", "--always", "--dirty", "--abbrev=12")
 
 
-def _tags(context: StageContext) -> dict[str, str]:
-    tags = {
-        "stage": context.name,
-        "git_revision": git_revision(context.root),
-    }
-    parent = os.environ.get("LUX_MLFLOW_PARENT")
-    if parent:
-        tags["mlflow.parentRunId"] = parent
-    return tags
+def flat_settings(prefix: str, settings: Settings) -> dict[str, str]:
+    """`splat.iterations` → "800", cut to the length that mlflow takes."""
+    flat: dict[str, str] = {}
 
-
-def _flat_params(context: StageContext) -> dict[str, Any]:
-    flat: dict[str, Any] = {"seed": context.seed}
-
-    def walk(prefix: str, value: Any) -> None:
+    def walk(name: str, value: Any) -> None:
         if isinstance(value, dict):
             for key, inner in value.items():
-                walk(f"{prefix}.{key}", inner)
+                walk(f"{name}.{key}", inner)
         else:
-            flat[prefix] = value
+            flat[name] = str(value)[:MAX_PARAM_LENGTH]
 
-    walk(context.name, context.settings.model_dump(mode="json"))
+    walk(prefix, settings.model_dump(mode="json"))
     return flat
 
 
-def _log_pictures(client: Any, run_id: str, context: StageContext) -> None:
+def _git(root: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip() or "unknown"
+
+
+def _tags(context: StageContext, does: str) -> dict[str, str]:
+    source, about = f"python -m tasks {context.name}", f"{does}\n\n{UNITS}"
+    tags = {"stage": context.name, **common_tags(context.root, source, about)}
+    parent = os.environ.get("LUX_MLFLOW_PARENT")
+    return {**tags, "mlflow.parentRunId": parent} if parent else tags
+
+
+def _log_pictures(client: MlflowClient, run_id: str, context: StageContext) -> None:
     for name, picture in context.pictures.items():
         if isinstance(picture, Path):
             # A folder per name: files of two captures may be called the same.

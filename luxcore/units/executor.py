@@ -14,6 +14,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol, runtime_checkable
 
 from luxcore.errors import InputError
+from luxcore.lifetime import die_with_parent
 
 Outcome = tuple[int, Any]
 """Index of the call, and what it returned."""
@@ -48,11 +49,10 @@ class ProcessExecutor:
     def run(
         self, function: Callable[..., Any], rows: Sequence[tuple[Any, ...]]
     ) -> Iterator[Outcome]:
-        context = multiprocessing.get_context("spawn")
         pending = dict(enumerate(rows))
         # A killed worker breaks the whole pool; the calls it took along are tried once more,
         # each in a pool of its own, so that the one that kills is named and the others survive.
-        with ProcessPoolExecutor(self.workers, mp_context=context) as pool:
+        with _pool(self.workers) as pool:
             futures = {pool.submit(function, *row): i for i, row in pending.items()}
             for future in as_completed(futures):
                 index = futures[future]
@@ -61,9 +61,18 @@ class ProcessExecutor:
                 pending.pop(index)
                 yield index, future.exception() or future.result()
         for index, row in pending.items():
-            with ProcessPoolExecutor(1, mp_context=context) as pool:
+            with _pool(1) as pool:
                 future = pool.submit(function, *row)
                 yield index, future.exception() or future.result()
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    # Workers hold each other's pipes open, so that they would outlive a killed parent for ever.
+    return ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=die_with_parent,
+    )
 
 
 class DaskExecutor:

@@ -14,15 +14,6 @@ from luxcore.errors import LuxError
 from tests.flows.toy import TOY_STAGES, dvc_repro, make_project, runs, set_seed
 
 
-@pytest.fixture(scope="module")
-def prefect_server(tmp_path_factory):
-    """A throw-away Prefect database, so that no test touches a user's."""
-    from prefect.testing.utilities import prefect_test_harness
-
-    with prefect_test_harness(server_startup_timeout=600):
-        yield
-
-
 @pytest.fixture
 def run_flow(monkeypatch, prefect_server):
     import flows.pipeline as pipeline
@@ -77,7 +68,7 @@ def test_a_stage_dies_with_dvc(tmp_path, project_root, shell):
     alive = root / "alive"
     (root / "first.py").write_text(
         f"import sys; sys.path.insert(0, {str(project_root)!r})\n"
-        "from tasks.process import die_with_parent; die_with_parent()\n"
+        "from luxcore.lifetime import die_with_parent; die_with_parent()\n"
         "import time, pathlib\n"
         f"while True: pathlib.Path({str(alive)!r}).write_text(str(time.time())); time.sleep(0.05)\n"
     )
