@@ -16,7 +16,7 @@ from luxcore.capture.points import write_points
 from luxcore.capture.store import Capture
 from luxcore.files.atomic import atomic_folder, write_json
 
-Layout = Literal["nerfstudio", "colmap"]
+Layout = Literal["nerfstudio", "colmap", "colmap-text"]
 
 _PINHOLE = 1
 """COLMAP's number of the camera model fx, fy, cx, cy."""
@@ -25,8 +25,8 @@ _PINHOLE = 1
 def export_capture(capture: Capture, out: Path, layout: Layout) -> None:
     """Write photos and cameras into the folder `out`, whole or not at all.
 
-    nerfstudio: transforms.json, images/, points.ply. COLMAP: sparse/0/*.bin, images/; its world
-    stays the capture's (z up), and its points have no tracks.
+    nerfstudio: transforms.json, images/, points.ply. COLMAP: sparse/0/*.bin or *.txt, images/; its
+    world stays the capture's (z up), and its points have no tracks.
     """
     with atomic_folder(Path(out)) as temporary:
         (temporary / "images").mkdir()
@@ -36,6 +36,8 @@ def export_capture(capture: Capture, out: Path, layout: Layout) -> None:
             _write_nerfstudio(capture, temporary)
         else:
             _write_colmap(capture, temporary / "sparse" / "0")
+            if layout == "colmap-text":
+                _to_text(temporary / "sparse" / "0")
 
 
 def _write_nerfstudio(capture: Capture, folder: Path) -> None:
@@ -55,6 +57,15 @@ def _write_colmap(capture: Capture, folder: Path) -> None:
     (folder / "cameras.bin").write_bytes(b"".join(_cameras(cameras)))
     (folder / "images.bin").write_bytes(b"".join(_images(cameras, names)))
     (folder / "points3D.bin").write_bytes(b"".join(_points(capture)))
+
+
+def _to_text(folder: Path) -> None:
+    """COLMAP's own conversion. Readers prefer binary files, so those go."""
+    import pycolmap
+
+    pycolmap.Reconstruction(folder).write_text(folder)
+    for file in folder.glob("*.bin"):
+        file.unlink()
 
 
 def _cameras(cameras: list[Camera]) -> Iterator[bytes]:
