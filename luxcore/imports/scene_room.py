@@ -6,6 +6,7 @@ Kept: shapes, base colours, roughness, metal and glass, powers and colours of la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,7 @@ from luxcore.imports.lamps import (
     lamp_kind,
 )
 from luxcore.imports.scene_file import SceneData, SceneMesh
+from luxcore.imports.standpoints import standpoints
 from luxcore.rooms.model import Lamp, Material, MaterialKind, Part, Room, Spot
 from luxcore.rooms.shapes import Ellipsoid, Lathe, Polygons, Shape, Vec3, disc
 
@@ -31,6 +33,7 @@ TALL_M = 30.0
 """A room higher than this is taken to be in centimetres, or in millimetres."""
 
 EYE_HEIGHT_M = 1.5
+MAX_VIEWPOINTS = 4
 _MIN_RADIUS_M = 0.01
 _LAMP = "lamp"
 
@@ -67,6 +70,7 @@ def scene_to_room(scene: SceneData, unit_m: float | None = None) -> ImportedRoom
         parts += bodies
         spots += beams
     top = max(float(high[2]), max(float(s.place[2]) for s in sources))
+    cameras = tuple(_camera(c, move) for c in scene.cameras if c["perspective"])
     floor, ceiling = low + move.shift, np.array([*high[:2], top]) + move.shift
     room = Room(
         seed=IMPORT_SEED,
@@ -79,9 +83,8 @@ def scene_to_room(scene: SceneData, unit_m: float | None = None) -> ImportedRoom
         spots=tuple(spots),
         openings=(),
         environment=None,
-        viewpoints=(_vec([*(0.5 * (low + high))[:2], min(EYE_HEIGHT_M, 0.6 * ceiling[2])]),),
+        viewpoints=_viewpoints(scene, cameras, float(ceiling[2]), move),
     )
-    cameras = tuple(_camera(c, move) for c in scene.cameras if c["perspective"])
     return ImportedRoom(room, cameras, tuple(notes))
 
 
@@ -94,6 +97,20 @@ class _Move:
 
     def points(self, xyz: np.ndarray) -> np.ndarray:
         return xyz * self.scale + self.shift
+
+
+def _viewpoints(
+    scene: SceneData, cameras: Sequence[Camera], height_m: float, move: _Move
+) -> tuple[Vec3, ...]:
+    fans = [
+        move.points(mesh.vertices[[face[0], face[k], face[k + 1]]])
+        for mesh in scene.meshes
+        for face in mesh.faces
+        for k in range(1, len(face) - 1)
+    ]
+    eye = min(EYE_HEIGHT_M, 0.6 * height_m)
+    wanted = [camera.centre for camera in cameras]
+    return tuple(_vec(p) for p in standpoints(np.array(fans), eye, wanted, MAX_VIEWPOINTS))
 
 
 def _guess_unit(scene: SceneData, vertices: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -14,10 +14,8 @@ from luxcore.data.public_writer import shard_members, write_scene, write_shards
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
 from luxcore.render.dataset import check_disk, panorama_jobs, run_jobs
-from luxcore.rooms.generate import generate_room
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
-from luxcore.settings.rooms import RoomsSettings
 from luxcore.statistics.contact_sheet import contact_sheet, save_sheet
 from luxcore.statistics.dataset import PAGE, SHEET
 from luxcore.statistics.facts import ViewFacts, facts_of_files
@@ -37,22 +35,23 @@ class PublicRender:
 
 
 def render_public(
-    seeds: Iterable[int],
+    rooms: Sequence[Room],
     out: Path,
     settings: RenderSettings,
-    rooms_settings: RoomsSettings,
     executor: Executor,
     *,
     shard_split: str | None = None,
 ) -> PublicRender:
-    """Render the rooms of `seeds` into `out`/<six digits of the seed>/.
+    """Render rooms into `out`/<six digits of the room's seed>/.
 
     A view that fails leaves its room with fewer views; a room without views is left out; both are
     named in the result. Work is kept in `out`/work until all is written, so a killed call resumes.
     With `shard_split` ("training", "test") the scenes are packed into tars of ten.
     Raises InputError for seeds without a six-digit id and LuxError when the disk is too small.
     """
-    rooms = [_room(seed, rooms_settings) for seed in seeds]
+    for room in rooms:
+        if not 0 <= room.seed <= LAST_SCENE_ID:
+            raise InputError(f"{room.seed} is no six-digit scene id: use 0 to {LAST_SCENE_ID}.")
     work = out / "work"
     jobs = {room.id: panorama_jobs([room], settings, room.id) for room in rooms}
     flat = [job for each in jobs.values() for job in each]
@@ -107,12 +106,6 @@ def _write_page(path: Path, title: str, shown: dict[str, Shown]) -> np.ndarray:
     sheet = contact_sheet([stem for views in shown.values() for stem in views.stems])
     write_page(path, title, [fact for views in shown.values() for fact in views.facts], sheet)
     return sheet
-
-
-def _room(seed: int, settings: RoomsSettings) -> Room:
-    if not 0 <= seed <= LAST_SCENE_ID:
-        raise InputError(f"seed {seed} has no six-digit scene id: use 0 to {LAST_SCENE_ID}.")
-    return generate_room(seed, settings)
 
 
 def _first(failed: dict[str, str]) -> str:

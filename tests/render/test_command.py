@@ -69,7 +69,9 @@ def test_stage_renders_all_splits_and_resumes(tmp_path: Path) -> None:
 def test_command_writes_the_public_layout(tmp_path: Path) -> None:
     out = tmp_path / "set"
     arguments = ["--rooms", "1", "--seed", "11", "--size", "32x16", "--spp", "1", "--views", "1"]
-    result = CliRunner().invoke(command, [*arguments, "--out", str(out), "--json"])
+    result = CliRunner(env={"LUX_EXECUTOR": "serial"}).invoke(
+        command, [*arguments, "--out", str(out), "--json"]
+    )
     assert result.exit_code == 0, result.output
     answer = json.loads(result.stdout.splitlines()[-1])
     assert answer == {"scenes": ["000011"], "views": 1, "failed": {}}
@@ -89,7 +91,9 @@ def test_command_writes_the_public_layout(tmp_path: Path) -> None:
 def test_every_shard_has_a_page(tmp_path: Path) -> None:
     out = tmp_path / "set"
     arguments = ["--rooms", "2", "--seed", "19", "--size", "32x16", "--spp", "1", "--views", "1"]
-    result = CliRunner().invoke(command, [*arguments, "--out", str(out), "--shards", "training"])
+    result = CliRunner(env={"LUX_EXECUTOR": "serial"}).invoke(
+        command, [*arguments, "--out", str(out), "--shards", "training"]
+    )
     assert result.exit_code == 0, result.output
     shards = {f"training-000{n}.{kind}" for n in (0, 1) for kind in ("tar", "html")}
     names = {"contact_sheet.png", "statistics", "statistics.html"}
@@ -118,7 +122,7 @@ def test_a_room_that_fails_is_set_aside_and_the_rest_goes_on(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("size", ["64x33", "64", "axb", "16x8", "x", "-64x-32"])
 def test_sizes_that_are_no_panorama(tmp_path: Path, size: str) -> None:
-    result = CliRunner().invoke(
+    result = CliRunner(env={"LUX_EXECUTOR": "serial"}).invoke(
         command, ["--rooms", "1", f"--size={size}", "--out", str(tmp_path / "o")]
     )
     assert isinstance(result.exception, InputError)
