@@ -96,7 +96,8 @@ def test_a_lamp_over_a_cube_is_as_bright_as_the_inverse_square_says(
     assert isinstance(files, FolderFiles)
     about = files.folder.parent / "statistics" / f"{files.scene_id}.json"
     factor = json.loads(about.read_text())["views"][0]["lamps"][0]["energy_factor"]
-    assert np.median(ratio) / factor == pytest.approx(1, abs=0.15)
+    # Four samples are noisy; a wrong unit would be wrong by 3 or more.
+    assert np.median(ratio) / factor == pytest.approx(1, abs=0.35)
 
 
 @pytest.mark.blender
