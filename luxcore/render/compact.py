@@ -11,7 +11,7 @@ from jaxtyping import Float
 from luxcore.cameras import Camera
 from luxcore.data import compact
 from luxcore.render.effects import Effects
-from luxcore.render.hdri import LUMINANCE
+from luxcore.render.hdri import LUMINANCE, hdri_path, usable_radiance
 from luxcore.render.views import View, view_to_json
 from luxcore.rooms.model import Lamp, Room
 
@@ -89,8 +89,10 @@ def _environment(room: Room) -> dict[str, Any] | None:
     environment = room.environment
     if environment is None:
         return None
+    _, changed = usable_radiance(hdri_path(environment.hdri))
     return {
         "hdri": Path(environment.hdri).stem,
         "rotation_deg": environment.rotation_deg,
         "mean_radiance": environment.mean_radiance,
+        **({"changed_values": changed} if changed else {}),
     }

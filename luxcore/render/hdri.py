@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.errors import FormatError, InputError
-from luxcore.files.exr import read_exr_image
+from luxcore.files.exr import HALF_MAX, read_exr
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
@@ -39,7 +39,7 @@ def mean_luminance(path: Path) -> float:
 
     Raises FormatError for a file that is no picture and InputError for a black one.
     """
-    luminance = _read_hdri(path) @ LUMINANCE
+    luminance = usable_radiance(path)[0] @ LUMINANCE
     height = luminance.shape[0]
     weight = np.cos(np.pi * (0.5 - (np.arange(height) + 0.5) / height))
     mean = float((luminance.mean(axis=1) * weight).sum() / weight.sum())
@@ -48,10 +48,25 @@ def mean_luminance(path: Path) -> float:
     return mean
 
 
+@cache
+def usable_radiance(path: Path) -> tuple[np.ndarray, int]:
+    """[h, w, 3] radiance that can be rendered with, and how many values had to be changed for it.
+
+    In a user's file NaN and negative values become 0, infinity the largest half. Blender's own
+    files are taken as they are: a few of their values are slightly below 0.
+    """
+    pixels = _read_hdri(path)
+    if path.parent == blender_hdri_folder():
+        return pixels, 0
+    clean = np.maximum(np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0), 0.0)
+    return clean, int(np.count_nonzero(clean != pixels))
+
+
 def _read_hdri(path: Path) -> np.ndarray:
     """[h, w, 3] linear radiance of an .exr or a Radiance .hdr."""
     if path.suffix != ".hdr":
-        return read_exr_image(path)
+        pixels = next(iter(read_exr(path, finite=False).values()))
+        return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
     import cv2
 
     pixels = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)

@@ -208,8 +208,8 @@ def test_library_is_not_older_than_its_known_holes():
     assert version >= (3, 4, 14)
 
 
-def test_environments_with_damage_are_refused_and_suns_are_kept(tmp_path):
-    from luxcore.render.hdri import mean_luminance
+def test_damage_in_environments_is_counted_and_suns_are_kept(tmp_path):
+    from luxcore.render.hdri import mean_luminance, usable_radiance
 
     sky = np.full((8, 16, 3), 0.5)
     sky[2, 3] = 1e5
@@ -223,7 +223,10 @@ def test_environments_with_damage_are_refused_and_suns_are_kept(tmp_path):
 
     header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage}
     planes = {c: np.ones((8, 16), np.float32) for c in "RGB"}
-    planes["G"][1, 1] = np.nan
+    planes["G"][1, 1], planes["R"][2, 2], planes["B"][3, 3] = np.nan, -2.0, np.inf
     OpenEXR.File(header, planes).write(str(tmp_path / "nan.exr"))
-    with pytest.raises(FormatError, match=r"nan\.exr.*1 values that are not finite"):
-        mean_luminance(tmp_path / "nan.exr")
+    radiance, changed = usable_radiance(tmp_path / "nan.exr")
+    assert changed == 3
+    assert radiance[1, 1, 1] == radiance[2, 2, 0] == 0
+    assert radiance[3, 3, 2] == 65504
+    assert usable_radiance(tmp_path / "sun.exr")[1] == 0

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from luxcore.cameras import look_at
@@ -179,6 +180,31 @@ def test_the_window_mask_is_where_the_outside_is(render: Renders) -> None:
     assert loaded.window.any()
     assert (loaded.ray_distance_m[loaded.window] == ENVIRONMENT_DISTANCE_M).all()
     assert np.median(loaded.ambient[loaded.window]) > np.median(loaded.ambient[~loaded.window])
+
+
+def test_a_sky_with_values_that_cannot_be_is_rendered_without_them(
+    render: Renders, tmp_path: Path
+) -> None:
+    """Damaged pixels as black ones: the same picture, and their number in the metadata."""
+    bright = next(r for r in (generate_room(s, RoomsSettings()) for s in range(50)) if _sunny(r))
+    view = PanoramaView(bright.viewpoints[0], 32, 16)
+    sky = np.random.Generator(np.random.PCG64(1)).uniform(0.5, 2.0, (16, 32, 3)).astype(np.float32)
+    black = sky.copy()
+    black[3, 4], black[8, :10] = 0.0, 0.0
+    sky[3, 4], sky[8, :10] = np.nan, -5.0
+    seen = {}
+    for name, pixels in (("black", black), ("damaged", sky)):
+        channels = {c: np.ascontiguousarray(pixels[..., i]) for i, c in enumerate("RGB")}
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, channels).write(str(tmp_path / f"{name}.exr"))
+        assert bright.environment is not None
+        outside = replace(bright.environment, hdri=str(tmp_path / f"{name}.exr"))
+        room = replace(bright, environment=outside)
+        seen[name] = load_rendered(render(room, view, name, spp=1, denoise="off"))
+    assert "changed_values" not in seen["black"].metadata["environment"]
+    assert seen["damaged"].metadata["environment"]["changed_values"] == 33
+    assert seen["damaged"].ambient.any()
+    assert seen["damaged"].ambient == pytest.approx(seen["black"].ambient, rel=1e-3, abs=1e-6)
 
 
 def test_top_up_renders_the_worst_lamp_only(

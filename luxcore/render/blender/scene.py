@@ -13,7 +13,7 @@ from luxcore.cameras import OPENGL_FROM_OPENCV, Camera
 from luxcore.render.blender.lights import LAMP_PROPERTY, OUTSIDE
 from luxcore.render.blender.materials import build_material, emitter_material
 from luxcore.render.effects import Effects
-from luxcore.render.hdri import hdri_path, mean_luminance
+from luxcore.render.hdri import hdri_path, mean_luminance, usable_radiance
 from luxcore.render.views import PanoramaView, View
 from luxcore.rooms.model import Environment, Opening, Part, Room, Spot
 
@@ -161,7 +161,7 @@ def _add_environment(world: Any, environment: Environment) -> None:
     tree = world.node_tree
     background = tree.nodes["Background"]
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = bpy.data.images.load(str(Path(path)))
+    texture.image = _environment_image(path)
     mapping = tree.nodes.new("ShaderNodeMapping")
     mapping.inputs["Rotation"].default_value[2] = math.radians(environment.rotation_deg)
     coordinates = tree.nodes.new("ShaderNodeTexCoord")
@@ -169,3 +169,18 @@ def _add_environment(world: Any, environment: Environment) -> None:
     tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
     tree.links.new(texture.outputs["Color"], background.inputs["Color"])
     background.inputs["Strength"].default_value = environment.mean_radiance / mean_luminance(path)
+
+
+def _environment_image(path: Path) -> Any:
+    """The file as it is, or its usable radiance where values had to be changed."""
+    radiance, changed = usable_radiance(path)
+    if not changed:
+        return bpy.data.images.load(str(path))
+    height, width, _ = radiance.shape
+    image = bpy.data.images.new("environment", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    # Blender's rows go upward.
+    pixels = np.dstack([radiance[::-1], np.ones((height, width, 1))]).astype(np.float32)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    return image
