@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "decompose": ("luxcore.cli.decompose:command", "One photo and lamp masks to one image a lamp."),
     "render": ("luxcore.cli.render:command", "Render rooms in the public dataset layout."),
     "statistics": ("luxcore.cli.statistics:command", "A page about a rendered dataset."),
+    "convert": ("luxcore.cli.convert:command", "Rendered views to the public layout and back."),
     "hdr": ("luxcore.cli.hdr:command", "Merge a photographer's bracket to linear HDR."),
     "evaluate": ("luxcore.cli.evaluate:command", "The tables of scores on a dataset."),
     "tradeoff": ("luxcore.cli.tradeoff:command", "What accuracy costs in time: Pareto curves."),

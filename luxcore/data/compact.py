@@ -147,6 +147,11 @@ def list_rendered(folder: Path) -> list[Path]:
     return stems
 
 
+def holds_compact(folder: Path) -> bool:
+    """Whether there are rendered views of this form below a folder."""
+    return folder.is_dir() and next(folder.rglob(f"*{MASKS_FILE}"), None) is not None
+
+
 def as_taken(view: RenderedView) -> Float[np.ndarray, "h w 3"]:
     """The photo's light: ambient + Σ on_i · scale_i · light_i (paper, equation 1), linear."""
     return compose(view.ambient, view.lights, view.scale * view.on[:, None])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from luxcore.data.compact import MASKS_FILE, list_rendered
+from luxcore.data.compact import holds_compact, list_rendered
 from luxcore.data.public_reader import PublicView, public_views
 from luxcore.data.store import AnyView
 from luxcore.progress import progress
@@ -41,6 +41,6 @@ def write_statistics(
 
 
 def _open(path: Path) -> list[tuple[str, Path | PublicView]]:
-    if path.is_dir() and next(path.rglob(f"*{MASKS_FILE}"), None) is not None:
+    if holds_compact(path):
         return [(str(stem.relative_to(path)), stem) for stem in list_rendered(path)]
     return [(f"{view.room}, view {view.view}", view) for view in public_views(path)]

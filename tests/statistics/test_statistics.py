@@ -134,6 +134,8 @@ def test_an_empty_folder_is_an_error(tmp_path: Path) -> None:
 def test_the_page_in_a_browser(dataset: Path, chromium: Browser) -> None:
     assert CliRunner().invoke(command, [str(dataset)]).exit_code == 0
     page = chromium.new_page(viewport={"width": 380, "height": 800})
+    # Generous for a loaded machine.
+    page.set_default_timeout(180_000)
     said: list[str] = []
     page.on("console", lambda message: said.append(message.text))
     page.on("request", lambda request: said.append(request.url))

@@ -1,0 +1,67 @@
+"""`lux convert`: both ways on the command line, from shards without unpacking them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from luxcore.cli.convert import command
+from luxcore.data.compact import as_taken, list_rendered, load_rendered, save_rendered
+from luxcore.data.public_reader import open_scenes
+from luxcore.errors import InputError
+from tests.data.analytic import panorama
+
+PLACES = ((2.0, 2.2, 1.5), (3.0, 1.2, 1.4), (4.5, 3.0, 1.6))
+
+
+@pytest.fixture
+def views(tmp_path: Path) -> Path:
+    """Two rooms: one seen from three places, one from a single one."""
+    folder = tmp_path / "compact"
+    for number, place in enumerate(PLACES):
+        save_rendered(panorama(place, height=16), folder / f"{number:06d}")
+    other = replace(panorama(PLACES[1], height=16), room="other")
+    save_rendered(other, folder / "000003")
+    return folder
+
+
+def convert(*words: str | Path) -> None:
+    result = CliRunner().invoke(command, [str(word) for word in words])
+    if result.exception is not None:
+        raise result.exception
+
+
+def test_there_and_back_through_shards(views: Path, tmp_path: Path) -> None:
+    public, back = tmp_path / "public", tmp_path / "back"
+    convert(views, "--out", public, "--first-scene", "9", "--shards", "training")
+    assert [p.name for p in sorted(public.iterdir())] == ["training-0000.tar", "training-0001.tar"]
+    # The views of a scene are inferred from the names inside of the tar.
+    assert [scene.views for scene in open_scenes(public)] == [[1, 2, 3], [1]]
+    convert(public, "--out", back)
+    assert [stem.name for stem in list_rendered(back)] == [
+        "000009_1",
+        "000009_2",
+        "000009_3",
+        "000010_1",
+    ]
+    for old, new in zip(list_rendered(views), list_rendered(back), strict=True):
+        first, second = load_rendered(old), load_rendered(new)
+        assert second.c2w == pytest.approx(first.c2w, abs=1e-6)
+        # Background and mixes are stored in half precision.
+        assert as_taken(second) == pytest.approx(as_taken(first), rel=2e-3, abs=1e-5)
+        assert (second.on == first.on).all()
+        assert np.array_equal(second.masks["emitter"], first.masks["emitter"])
+    assert sorted(p.name for p in public.iterdir()) == ["training-0000.tar", "training-0001.tar"]
+
+
+def test_a_folder_of_neither_form_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no scenes"):
+        convert(tmp_path / "empty", "--out", tmp_path / "out")
+    with pytest.raises(InputError, match="does not exist"):
+        convert(tmp_path / "nowhere", "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
