@@ -23,12 +23,22 @@ from luxcore.splats.losses.smoothness import (
     nearest_neighbors,
 )
 
-SIZES = [(1, 1, 3), (1, 40, 1), (37, 1, 3), (16, 16, 1), (23, 31, 3), (24, 20, 27), (9, 13, 5)]
+SIZES = [
+    (1, 1, 3), (1, 40, 1), (37, 1, 3), (16, 16, 1), (23, 31, 3), (9, 13, 5),
+    # In strips on CPUs: smaller than the window, several strips, whole and overlapping groups.
+    (1, 1, 8), (2, 3, 9), (24, 20, 27), (11, 150, 12), (30, 66, 16),
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def device() -> Device:
     return open_device()
+
+
+@pytest.fixture(scope="module", params=["block", "pixel"])
+def either(request: pytest.FixtureRequest) -> Device:
+    """The losses have a way for CPUs and one for GPUs."""
+    return open_device(mapping=request.param)
 
 
 def images(shape: tuple[int, ...], seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -65,10 +75,10 @@ def twin_image_loss(
 @pytest.mark.parametrize("shape", SIZES)
 @pytest.mark.parametrize("weights", [(0.8, 0.2), (1.0, 0.0), (0.0, 1.0)])
 def test_image_loss_matches_twin(
-    device: Device, shape: tuple[int, int, int], weights: tuple[float, float]
+    either: Device, shape: tuple[int, int, int], weights: tuple[float, float]
 ) -> None:
     x, y = images(shape)
-    value, gradient = run_image_loss(device, x, y, *weights)
+    value, gradient = run_image_loss(either, x, y, *weights)
     expected, expected_gradient = twin_image_loss(x, y, *weights)
     # float32 moments lose about 1e-6 of a variance that is 1e-2: 1e-4 of the gradient.
     assert value == pytest.approx(expected, rel=2e-6, abs=1e-6)
@@ -90,18 +100,22 @@ def test_image_loss_gradient_by_finite_differences() -> None:
 
 
 @pytest.mark.parametrize("level", [0.0, 0.3, 1.0, 1000.0])
-def test_flat_images_have_ssim_one_and_no_noise(device: Device, level: float) -> None:
+@pytest.mark.parametrize("channels", [3, 9])
+def test_flat_images_have_ssim_one_and_no_noise(
+    device: Device, level: float, channels: int
+) -> None:
     """Rounding makes a flat region's variance negative: unclamped, SSIM leaves [-1, 1]."""
-    flat = np.full((40, 48, 3), level, np.float32)
+    flat = np.full((40, 48, channels), level, np.float32)
     value, gradient = run_image_loss(device, flat, flat, 0.0, 1.0)
     assert value == pytest.approx(0.0, abs=1e-5)
     # Every derivative of SSIM vanishes at x = y; noise of variances is divided by C2 = 9e-4.
     assert np.abs(gradient).max() < 1e-6
 
 
-def test_ssim_never_exceeds_one_on_noisy_flat_hdr(device: Device) -> None:
+@pytest.mark.parametrize("channels", [3, 9])
+def test_ssim_never_exceeds_one_on_noisy_flat_hdr(device: Device, channels: int) -> None:
     random = np.random.default_rng(0)
-    x = (1e4 + random.normal(size=(32, 32, 3))).astype(np.float32)
+    x = (1e4 + random.normal(size=(32, 32, channels))).astype(np.float32)
     value, gradient = run_image_loss(device, x, x, 0.0, 1.0)
     assert -1e-6 <= value <= 1.0
     assert np.isfinite(gradient).all()
