@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.small.features import photo_features
@@ -23,6 +23,9 @@ GEOMETRY_OUTPUTS = 5
 TYPICAL_DEPTH_M = 3.0
 TYPICAL_FOCAL = 0.87
 """In long sides of the photo: 60 degrees."""
+
+FARTHEST_M = 30.0
+"""Beyond this is outdoors, seen through a window: no part of the room, and not learned."""
 
 ESTIMATED_TRUST = 0.5
 
@@ -72,7 +75,7 @@ def geometry_loss(
 
     `focal` in long sides of the photo.
     """
-    guess, valid = read_outputs(outputs[0].float()), truth.valid
+    guess, valid = read_outputs(outputs[0].float()), indoors(truth)
     error = guess.log_depth - torch.log(truth.points[2].clamp_min(1e-3))
     error = torch.where(valid, error, torch.zeros_like(error))
     count = valid.sum().clamp_min(1)
@@ -86,6 +89,11 @@ def geometry_loss(
         + 0.5 * angle.sum() / count
         + 0.2 * (guess.log_focal - torch.log(focal)).abs()
     )
+
+
+def indoors(truth: Surfaces) -> Bool[Tensor, "h w"]:
+    """Where a surface of the room is known."""
+    return truth.valid & (truth.points[2] < FARTHEST_M)
 
 
 def _slope(error: Tensor, valid: Tensor, axis: int) -> Tensor:

@@ -23,6 +23,7 @@ from luxcore.models.small.geometry import (
     GEOMETRY_OUTPUTS,
     PHOTO_CHANNELS,
     geometry_loss,
+    indoors,
     read_outputs,
 )
 from luxcore.models.small.network import NetworkShape, UNet
@@ -98,7 +99,7 @@ def geometry_scores(net: UNet, cases: Sequence[tuple[Tensor, SeenPhoto]]) -> dic
     depth, angle = [], []
     with torch.no_grad():
         for features, truth in cases:
-            guess, valid = read_outputs(net(features)[0].float()), truth.surfaces.valid
+            guess, valid = read_outputs(net(features)[0].float()), indoors(truth.surfaces)
             error = (guess.log_depth - torch.log(truth.surfaces.points[2]))[valid]
             depth.append(torch.expm1((error - error.median()).abs()).mean())
             cosine = (guess.normals * truth.surfaces.normals).sum(0)[valid]
