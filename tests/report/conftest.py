@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import write_exr
@@ -84,9 +85,30 @@ def artifacts(tmp_path_factory: pytest.TempPathFactory) -> Path:
         root / "timings" / "splat.json",
         {"wall_s": 12.5, "peak_memory_mb": 300.0, "curve_demo": curve},
     )
+    lights_curve = [
+        {"iteration": i, "seconds": i * 0.2, "psnr_lights": 18 + i / 40} for i in (0, 40, 80)
+    ]
+    write_json(root / "timings" / "relight.json", {"wall_s": 3.0, "curve_demo": lights_curve})
     for room in range(2):
         _write_room(root, room)
+    _write_effects(root / "effects")
     return root
+
+
+def _write_effects(folder: Path) -> None:
+    row = {
+        "effect": "portals",
+        "decided": "on, 2",
+        "reason": "one per opening",
+        "seconds": 2.0,
+        "seconds_other": 1.75,
+        "light_other": -0.125,
+        "difference": 3.5,
+        "noise": 1.25,
+    }
+    write_json(folder / "effects.json", {"version": 1, "about": {}, "rooms": {"demo-demo": [row]}})
+    write_png(folder / "picture.png", photo(0))
+    Image.open(folder / "picture.png").convert("RGB").save(folder / "demo-demo.jpg")
 
 
 def _write_view(root: Path, view: int) -> None:

@@ -81,6 +81,19 @@ def test_tables_show_missing_scores_and_the_papers_figures(report: Path) -> None
     assert "<td>paper: SD</td><td>its own rooms</td><td></td><td>27.13</td><td></td>" in text
 
 
+def test_both_stages_of_the_splats_have_their_curve_against_seconds(report: Path) -> None:
+    splats = report.read_text().split('id="splats"')[1].split("</section>")[0]
+    for stage in ("splat", "relight"):
+        assert f"pictures/{stage}-curve.svg" in splats
+        assert "time, s" in (report.parent / f"pictures/{stage}-curve.svg").read_text()
+
+
+def test_effects_that_were_measured_both_ways_are_shown(report: Path) -> None:
+    effects = report.read_text().split('id="effects"')[1].split("</section>")[0]
+    assert "<td>2.00</td><td>-0.25</td><td>-12.5 %</td><td>3.50</td><td>1.25</td>" in effects
+    assert "pictures/effects-demo-demo.jpg" in effects
+
+
 def test_the_worst_case_leads_the_failures(report: Path) -> None:
     failures = report.read_text().split('id="failures"')[1].split("</section>")[0]
     assert "failure-demo-light_01-0003-truth.jpg" in failures

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,41 @@ from luxcore.report.sources import CaptureFiles, find_captures, read_json, sprea
 DEPTHS_SHOWN = 4
 
 
+@dataclass(frozen=True)
+class Curve:
+    """Quality against seconds of one stage, as its timings hold it."""
+
+    stage: str
+    score: str
+    title: str
+    axis: str
+    caption: str
+
+
+CURVES = (
+    Curve(
+        "splat",
+        "psnr_heldout",
+        "How fast geometry is found",
+        "PSNR of held-out views, dB",
+        "stage 1, one line a capture: photos that it was not fitted to",
+    ),
+    Curve(
+        "relight",
+        "psnr_lights",
+        "How fast the lamps' light is found",
+        "PSNR of single lamps in held-out views, dB",
+        "stage 2, one line a capture: against the fused light of views that it was not fitted to",
+    ),
+)
+
+
 def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section | None:
     """Curves of held-out quality against time, depth maps, metrics and lamp thumbnails."""
     captures = find_captures(artifacts)
     blocks: list[Strip | Table] = []
-    curve = _curve(artifacts, captures, gallery)
-    if curve:
-        blocks.append(curve)
+    for curve in CURVES:
+        blocks += _curve(curve, artifacts, captures, gallery)
     for capture in captures:
         blocks += _depths(capture, gallery) + _thumbnails(capture, gallery)
     table = _metrics(captures)
@@ -34,21 +63,23 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     return Section("Splats", "splats", intro, tuple(blocks))
 
 
-def _curve(artifacts: Path, captures: list[CaptureFiles], gallery: Gallery) -> Strip | None:
-    timings = read_json(artifacts / "timings" / "splat.json") or {}
+def _curve(
+    curve: Curve, artifacts: Path, captures: list[CaptureFiles], gallery: Gallery
+) -> list[Strip | Table]:
+    """One line a capture; seconds are not a stage's output, so they lie with its timings."""
+    timings = read_json(artifacts / "timings" / f"{curve.stage}.json") or {}
     series = {}
     for capture in captures:
         points = timings.get(f"curve_{capture.id}") or []
         if points:
             series[capture.id] = (
                 [point["seconds"] for point in points],
-                [point["psnr_heldout"] for point in points],
+                [point[curve.score] for point in points],
             )
     if not series:
-        return None
-    axes = ("time, s", "PSNR of held-out views, dB")
-    picture = gallery.curves("splat-curve", series, axes, "stage 1, one line a capture")
-    return Strip("How fast geometry is found", "splat", (picture,))
+        return []
+    picture = gallery.curves(f"{curve.stage}-curve", series, ("time, s", curve.axis), curve.caption)
+    return [Strip(curve.title, curve.stage, (picture,))]
 
 
 def _depths(capture: CaptureFiles, gallery: Gallery) -> list[Strip | Table]:
