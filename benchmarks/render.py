@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+import benchmarks.blender_alone  # noqa: F401 (loads Blender without spinning threads)
 from luxcore.render.blender.lights import OUTSIDE, only_lamp
 from luxcore.render.blender.passes import Passes, configure, render
 from luxcore.render.blender.scene import (
@@ -55,11 +56,11 @@ def cpu_seconds() -> float:
 class Bench:
     """One room in Blender; renders are timed without the building of the scene."""
 
-    def __init__(self, room: Room, effects: Effects | None = None) -> None:
+    def __init__(self, room: Room, effects: Effects | None = None, height: int = HEIGHT) -> None:
         self.room = room
         self.effects = effects or analyse_effects(room)
         self.scene = build_scene(room, self.effects)
-        place_camera(self.scene, PanoramaView(room.viewpoints[0], 2 * HEIGHT, HEIGHT))
+        place_camera(self.scene, PanoramaView(room.viewpoints[0], 2 * height, height))
 
     def render(self, spp: int, seed: int, lamp: int | None = None) -> tuple[Passes, float]:
         """All groups, or one lamp (or OUTSIDE) alone; the passes and CPU-seconds."""
@@ -107,17 +108,17 @@ def effect_variants(room: Room) -> Iterator[tuple[str, Effects, Effects]]:
     """(what, as decided, the other way round) for every decision that can be flipped."""
     decided = analyse_effects(room)
     sharp = decided.caustics.on
-    yield "caustics", decided, _set(decided, "caustics", not sharp, decided.caustics.amount)
+    yield "caustics", decided, with_effect(decided, "caustics", not sharp, decided.caustics.amount)
     on = decided.transmission.on
-    yield "transmission", decided, _set(decided, "transmission", not on, 0 if on else 8)
+    yield "transmission", decided, with_effect(decided, "transmission", not on, 0 if on else 8)
     deep = decided.glossy.amount > 3
-    yield "glossy bounces", decided, _set(decided, "glossy", True, 3 if deep else 5)
-    yield "diffuse bounces 8 → 3", decided, _set(decided, "diffuse", True, 3)
+    yield "glossy bounces", decided, with_effect(decided, "glossy", True, 3 if deep else 5)
+    yield "diffuse bounces 8 → 3", decided, with_effect(decided, "diffuse", True, 3)
     tree = decided.light_tree.on
-    yield "light tree", decided, _set(decided, "light_tree", not tree, 0)
+    yield "light tree", decided, with_effect(decided, "light_tree", not tree, 0)
     if decided.environment.on:
-        yield "portals", decided, _set(decided, "portals", False, 0)
-        yield "environment", decided, _set(decided, "environment", False, 0)
+        yield "portals", decided, with_effect(decided, "portals", False, 0)
+        yield "environment", decided, with_effect(decided, "environment", False, 0)
 
 
 def effect_row(room: Room, what: str, decided: Effects, other: Effects, spp: int) -> str:
@@ -128,8 +129,8 @@ def effect_row(room: Room, what: str, decided: Effects, other: Effects, spp: int
         bench.render(1, 0)
         truth, _ = bench.render(LEVEL_SPP, 7)
         passes, took = bench.render(spp, 1)
-        pictures.append(_photo(room, truth))
-        noises.append(relative_variance(_photo(room, passes), _photo(room, truth)))
+        pictures.append(photo(room, truth))
+        noises.append(relative_variance(photo(room, passes), photo(room, truth)))
         seconds.append(took)
     level = pictures[0].mean()
     lost = 100 * float(pictures[1].mean() / level - 1)
@@ -141,7 +142,8 @@ def effect_row(room: Room, what: str, decided: Effects, other: Effects, spp: int
     )
 
 
-def _photo(room: Room, passes: Passes) -> np.ndarray:
+def photo(room: Room, passes: Passes) -> np.ndarray:
+    """[h, w, 3] linear radiance with all lamps at their own power."""
     total = passes.groups[AMBIENT_GROUP].astype(np.float64)
     for lamp in room.lamps:
         total = total + np.array(lamp.scale) * passes.groups[lamp_group(lamp.id)]
@@ -149,7 +151,8 @@ def _photo(room: Room, passes: Passes) -> np.ndarray:
     return np.minimum(total, np.percentile(total, 98))
 
 
-def _set(effects: Effects, field: str, on: bool, amount: int) -> Effects:
+def with_effect(effects: Effects, field: str, on: bool, amount: int) -> Effects:
+    """The same decisions but for one."""
     return replace(effects, **{field: Effect(on, "benchmark", amount)})
 
 
