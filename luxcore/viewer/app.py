@@ -21,7 +21,7 @@ from luxcore.splats.relighting import mixing_weights
 from luxcore.splats.scene import Scene
 from luxcore.viewer.cameras import camera_of_browser, place_browser
 from luxcore.viewer.colours import Colours
-from luxcore.viewer.exact import ExactRenderer, FilmStoppedError, Shot
+from luxcore.viewer.exact import ExactRenderer, Shot
 from luxcore.viewer.files_menu import FilesMenu
 from luxcore.viewer.latest import LatestWins
 from luxcore.viewer.lighting import Lighting, lamp_settings, light_names
@@ -68,6 +68,9 @@ class Viewer:
         self.exact: LatestWins[Callable[[Callable[[], bool]], None]] = LatestWins(
             self._run, self._complain, REST_S
         )
+        self.films: LatestWins[Callable[[Callable[[], bool]], None]] = LatestWins(
+            self._run, self._complain
+        )
         self.panel = Panel(self.server.gui, viewed.scene, viewed.thumbnails, self._lighting_changed)
         FilesMenu(self, out)
         if viewed.cameras:
@@ -80,6 +83,7 @@ class Viewer:
         """Stop serving; work under way is finished, work waiting is dropped."""
         self.fast.close()
         self.exact.close()
+        self.films.close()
         with redirect_stdout(StringIO()):
             self.server.stop()
 
@@ -130,8 +134,6 @@ class Viewer:
 
     def _complain(self, error: Exception) -> None:
         """Tell every browser; what was shown stays."""
-        if isinstance(error, FilmStoppedError):
-            return
         known = isinstance(error, LuxError)
         body = str(error) if known else f"{type(error).__name__}: {error}"
         for tab in list(self._tabs.values()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,16 +29,18 @@ class Shot:
 
 
 class ExactRenderer:
-    """Holds the scene on the device; use it from one thread at a time."""
+    """Holds the scene on the device; threads take turns, picture by picture."""
 
     def __init__(self, scene: Scene) -> None:
         self._names = light_names(scene)
         self._exposure = scene.tone.exposure
         self._camera = MovingCamera(scene)
+        self._turn = threading.Lock()
 
     def linear(self, shot: Shot) -> Float[np.ndarray, "h w 3"]:
         """Linear radiance, before exposure."""
-        return self._camera.render(shot.camera, lamp_settings(self._names, shot.lighting))
+        with self._turn:
+            return self._camera.render(shot.camera, lamp_settings(self._names, shot.lighting))
 
     def display(self, shot: Shot) -> Float[np.ndarray, "h w 3"]:
         """What a screen shows, 0..1."""
@@ -55,10 +58,12 @@ def write_film(
     shots: Sequence[Shot],
     fps: int,
     is_current: Callable[[], bool],
+    tell: Callable[[int], None] = lambda done: None,
 ) -> Path:
     """Write `folder`/0000.png … and film.mp4 (H.264); returns the film.
 
-    Raises FilmStoppedError once `is_current()` is False: the pictures so far stay, no film is made.
+    `tell` is called with the number of pictures done. Raises FilmStoppedError once `is_current()`
+    is False: the pictures so far stay, no film is made.
     """
     import imageio.v2 as imageio
 
@@ -69,6 +74,7 @@ def write_film(
         imageio.get_writer(temporary, **options) as film,
     ):
         for index, shot in enumerate(shots):
+            tell(index)
             if not is_current():
                 raise FilmStoppedError
             image = np.round(np.clip(renderer.display(shot), 0, 1) * 255).astype(np.uint8)

@@ -12,7 +12,7 @@ from luxcore.cameras import Camera
 from luxcore.errors import InputError
 from luxcore.files.exr import write_exr
 from luxcore.viewer.cameras import camera_of_browser, place_browser
-from luxcore.viewer.exact import Shot, write_film
+from luxcore.viewer.exact import FilmStoppedError, Shot, write_film
 from luxcore.viewer.path import camera_path
 from luxcore.viewer.presets import load_preset, preset_value
 from luxcore.viewer.tabs import MAX_PIXELS
@@ -43,7 +43,7 @@ class FilesMenu:
             self._fps = gui.add_slider("frames a second", 5, 60, 1, 24)
             self._loop = gui.add_checkbox("loop", False)
             gui.add_button("Render film", hint="PNG pictures and an MP4").on_click(self._film)
-            gui.add_button("Stop film").on_click(lambda _: viewer.exact.cancel(FILM_KEY))
+            gui.add_button("Stop film").on_click(lambda _: viewer.films.cancel(FILM_KEY))
             gui.add_button("Still (EXR)", hint="linear light").on_click(self._still)
 
     def _save_preset(self, event: Any) -> None:
@@ -77,16 +77,17 @@ class FilesMenu:
         self._viewer.tab(event.client).keyframes.clear()
 
     def _film(self, event: Any) -> None:
-        keyframes = self._viewer.tab(event.client).keyframes
-        fps = int(self._fps.value)
-        frames = fps * int(self._seconds.value)
-        try:
-            cameras = camera_path(keyframes, frames, loop=bool(self._loop.value))
-        except InputError as error:
-            event.client.add_notification("No film yet", str(error), color="red")
+        client, fps = event.client, int(self._fps.value)
+        keyframes = self._viewer.tab(client).keyframes
+        if len(keyframes) < 2:
+            body = (
+                f"A film leads from keyframe to keyframe: it needs two, there are {len(keyframes)}."
+            )
+            client.add_notification("No film yet", body, color="red")
             return
-        client = event.client
-        self._viewer.exact.submit(
+        frames = fps * int(self._seconds.value)
+        cameras = camera_path(keyframes, frames, loop=bool(self._loop.value))
+        self._viewer.films.submit(
             FILM_KEY, lambda is_current: self._write_film(client, cameras, fps, is_current)
         )
 
@@ -95,10 +96,18 @@ class FilesMenu:
     ) -> None:
         lighting = self._viewer.panel.read()
         folder = self._out / f"film-{_stamp()}"
-        note = client.add_notification("Film", f"{len(cameras)} pictures …", loading=True)
+        note = client.add_notification("Film", "", loading=True, with_close_button=False)
+
+        def tell(done: int) -> None:
+            note.body = f"{done} of {len(cameras)} pictures"
+
         try:
             shots = [Shot(camera, lighting) for camera in cameras]
-            film = write_film(folder, self._viewer.renderer, shots, fps, is_current)
+            film = write_film(folder, self._viewer.renderer, shots, fps, is_current, tell)
+        except FilmStoppedError:
+            body = f"Stopped; the pictures so far are in {folder.resolve()}."
+            client.add_notification("Film", body, color="yellow")
+            return
         finally:
             note.remove()
         client.add_notification("Film", f"{film.resolve()}", color="green")
