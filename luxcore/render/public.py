@@ -13,7 +13,7 @@ from luxcore.data.compact import load_rendered
 from luxcore.data.public_writer import shard_members, write_scene, write_shards
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
-from luxcore.render.dataset import check_disk, panorama_jobs, run_jobs
+from luxcore.render.dataset import Job, check_disk, panorama_jobs, run_jobs
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
 from luxcore.statistics.contact_sheet import contact_sheet, save_sheet
@@ -59,17 +59,11 @@ def render_public(
     check_disk(flat + flat, out)
     failed = run_jobs(flat, work / "views", settings, UnitStore(work / "units"), executor)
     seconds = read_seconds(UnitStore(work / "units"))
-    shown: dict[str, Shown] = {}
+    shown = {}
     for room in rooms:
         done = [job for job in jobs[room.id] if job.unit.name not in failed]
         if done:
-            stems = [work / "views" / job.stem for job in done]
-            write_scene(out, room.id, [load_rendered(stem) for stem in stems], seed=room.seed)
-            facts = [
-                facts_of_files(work / "views" / j.stem, j.stem, seconds.get(j.unit.name))
-                for j in done
-            ]
-            shown[room.id] = Shown(stems, facts)
+            shown[room.id] = _write_room(room, done, seconds, work, out)
     if not shown:
         raise LuxError(f"no view of {len(rooms)} rooms could be rendered: {_first(failed)}")
     _write_pages(out, shown, shard_split)
@@ -88,6 +82,16 @@ class Shown:
 
     stems: list[Path]
     facts: list[ViewFacts]
+
+
+def _write_room(
+    room: Room, done: list[Job], seconds: dict[str, dict[str, float]], work: Path, out: Path
+) -> Shown:
+    stems = [work / "views" / job.stem for job in done]
+    write_scene(out, room.id, [load_rendered(stem) for stem in stems], seed=room.seed)
+    names = [job.unit.name for job in done]
+    pairs = zip(stems, names, strict=True)
+    return Shown(stems, [facts_of_files(stem, name, seconds.get(name)) for stem, name in pairs])
 
 
 def _write_pages(out: Path, shown: dict[str, Shown], shard_split: str | None) -> None:
