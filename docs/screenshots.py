@@ -1,14 +1,16 @@
 """Take the pictures of docs/images from a finished run: `python docs/screenshots.py`.
 
-Needs Debian's Chromium and, for the dashboards, `lux dashboards` running.
+Needs Debian's Chromium and, for the dashboards, `lux dashboards` running over that run.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import urllib.parse
+import urllib.request
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from playwright.sync_api import sync_playwright
 
@@ -33,6 +35,45 @@ def shoot(browser: Browser, address: str, out: Path, size: tuple[int, int], wait
     page.screenshot(path=str(out), type="jpeg", quality=QUALITY)
     page.close()
     print(out)
+
+
+def ask(address: str, body: dict[str, Any]) -> Any:
+    """The answer of a server of ours to a POST."""
+    request = urllib.request.Request(
+        address, json.dumps(body).encode(), {"Content-Type": "application/json"}
+    )
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        return json.load(answer)
+
+
+def shoot_mlflow(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
+    """The table of runs; curves, pictures and use of the machine of the newest stage 1."""
+    search = f"{address}/api/2.0/mlflow/runs/search"
+    found = ask(search, {"experiment_ids": ["1"], "filter": "tags.stage = 'splat'"})
+    run = f"{address}/#/experiments/1/runs/{found['runs'][0]['info']['run_id']}"
+    pages = {
+        "runs": f"{address}/#/experiments/1/runs",
+        "run": run,
+        "curves": f"{run}/model-metrics",
+        "system": f"{run}/system-metrics",
+        "pictures": f"{run}/artifacts",
+    }
+    for name, page in pages.items():
+        shoot(browser, page, out / f"mlflow_{name}.jpg", (1400, 860), wait_ms)
+
+
+def shoot_prefect(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
+    """The newest finished flow with its tasks, what it says of its stages, and the list of runs."""
+    query = {
+        "flows": {"name": {"any_": ["luxremix"]}},
+        "flow_runs": {"state": {"type": {"any_": ["COMPLETED"]}}},
+        "sort": "END_TIME_DESC",
+        "limit": 1,
+    }
+    run = f"{address}/runs/flow-run/{ask(f'{address}/api/flow_runs/filter', query)[0]['id']}"
+    pages = {"flow": run, "artifacts": f"{run}?tab=Artifacts", "runs": f"{address}/runs"}
+    for name, page in pages.items():
+        shoot(browser, page, out / f"prefect_{name}.jpg", (1400, 860), wait_ms)
 
 
 def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:
@@ -61,17 +102,20 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/images"))
     parser.add_argument("--mlflow", help="address of mlflow's page, if it runs")
     parser.add_argument("--prefect", help="address of Prefect's page, if it runs")
+    parser.add_argument("--wait-ms", type=int, default=8000, help="for a dashboard to fill")
     given = parser.parse_args()
     reports, out = given.reports.resolve().as_uri(), given.out
     blend = f"{reports}/blend-demo.html#{urllib.parse.quote(EVENING, safe='=&,')}"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        shoot(browser, f"{reports}/index.html", out / "report.jpg", (1200, 1000), 1500)
-        shoot(browser, blend, out / "explorer.jpg", (1400, 860), 3000)
-        shoot(browser, blend, out / "explorer_phone.jpg", (390, 844), 3000)
-        for name in ("mlflow", "prefect"):
-            if address := getattr(given, name):
-                shoot(browser, address, out / f"{name}.jpg", (1400, 860), 8000)
+        if given.mlflow:
+            shoot_mlflow(browser, given.mlflow, out, given.wait_ms)
+        if given.prefect:
+            shoot_prefect(browser, given.prefect, out, given.wait_ms)
+        if given.reports.is_dir():
+            shoot(browser, f"{reports}/index.html", out / "report.jpg", (1200, 1000), 1500)
+            shoot(browser, blend, out / "explorer.jpg", (1400, 860), 3000)
+            shoot(browser, blend, out / "explorer_phone.jpg", (390, 844), 3000)
         if given.scene.is_dir():
             shoot_viewer(browser, given.scene, out, 8133)
         browser.close()

@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from flows.dag import BY_NAME, COMMON_CODE, STAGES, Stage
+from flows.plots import PLOTS
 
 HEADER = "# Generated from flows/dag.py by `python -m flows.dvc_file`; edit that file instead.\n"
 DVC_FILE = Path(__file__).resolve().parents[1] / "dvc.yaml"
@@ -15,7 +16,10 @@ DVC_FILE = Path(__file__).resolve().parents[1] / "dvc.yaml"
 
 def render_dvc_yaml() -> str:
     """The text of `dvc.yaml`."""
-    document = {"stages": {stage.name: _stage_entry(stage) for stage in STAGES}}
+    document = {
+        "stages": {stage.name: _stage_entry(stage) for stage in STAGES},
+        "plots": [plot.entry() for plot in PLOTS],
+    }
     return HEADER + yaml.safe_dump(document, sort_keys=False, width=100)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import subprocess
 from pathlib import Path
@@ -9,6 +10,8 @@ from pathlib import Path
 import yaml
 
 from flows.dag import ordered, upstream
+from flows.living import bury_dead_runs
+from flows.prefect_settings import prefect_home
 from flows.shared_server import kept_up, name_server
 from luxcore.errors import BusyError, InputError, LuxError
 from luxcore.files.atomic import atomic_file
@@ -39,19 +42,28 @@ def serve(
             clear_missed_runs(name)
             pages = os.environ["PREFECT_API_URL"].removesuffix("/api")
             print(f"{name}: runs at {cron!r} in {place}; pages at {pages}", flush=True)
-            scheduled_run.serve(
-                name=name,
-                cron=cron,
-                parameters={
-                    "root": str(root),
-                    "worktree": str(place),
-                    "targets": targets,
-                    "changes": changes,
-                },
-                print_starting_message=False,
-            )
+            given = {"root": str(root), "worktree": str(place)}
+            parameters = {**given, "targets": targets, "changes": changes}
+            try:
+                scheduled_run.serve(
+                    name, cron=cron, parameters=parameters, print_starting_message=False
+                )
+            finally:
+                _end_runs(root)
     except BusyError as error:
         raise LuxError(f"{name} is on a schedule already: {error}") from error
+
+
+def _end_runs(root: Path) -> None:
+    """A schedule that is stopped takes its run along while the server still listens.
+
+    Prefect would wait for it to finish. Units that are done are kept for the next run.
+    """
+    children = multiprocessing.active_children()
+    for child in children:
+        child.kill()
+        child.join()
+    bury_dead_runs(prefect_home(root))
 
 
 def default_worktree(root: Path) -> Path:

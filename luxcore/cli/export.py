@@ -82,6 +82,10 @@ def command(
         _export_capture(scene, form, out)
         return
 
+    from luxcore.splats.scene_files import check_scene
+
+    # Before the imports that take seconds.
+    check_scene(scene)
     from luxcore.splats.relighting import mixing_weights
     from luxcore.splats.scene import load_scene
 

@@ -39,6 +39,10 @@ def command(
     PNG is AgX at the scene's exposure; EXR holds linear radiance.
     """
     check_out(out)
+    from luxcore.splats.scene_files import check_scene
+
+    # Before the imports that take seconds.
+    check_scene(scene)
     settings = parse_lamp_settings(options)
 
     from luxcore.light.agx import agx

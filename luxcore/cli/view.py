@@ -22,6 +22,12 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 )  # fmt: skip
 def command(scene: Path, port: int, host: str, out: Path) -> None:
     """Interactive viewer of a relightable SCENE: a switch, dimmer and colour for every lamp."""
+    from luxcore.ports import check_port
+    from luxcore.splats.scene_files import check_scene
+
+    # Before the imports that take seconds.
+    check_scene(scene)
+    check_port(host, port)
     from luxcore.viewer.app import Viewer
     from luxcore.viewer.open import open_scene
 

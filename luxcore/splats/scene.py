@@ -9,7 +9,6 @@ thumbnails/lamp_0.png
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -20,14 +19,12 @@ import numpy as np
 from jaxtyping import Float32
 
 from luxcore.cameras import Camera, camera_to_nerfstudio
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError
 from luxcore.files.atomic import atomic_file, write_json
 from luxcore.files.digests import file_digest
 from luxcore.splats.gaussians import Gaussians
 from luxcore.splats.ply import read_ply, write_ply
-
-VERSION = 1
-_FILES = ("splats.ply", "lights.safetensors", "transforms.json")
+from luxcore.splats.scene_files import FILES, VERSION, check_scene
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def save_scene(
         "ambient_scale": list(scene.ambient_scale),
         "tone": asdict(scene.tone),
         "views": scene.views,
-        "digests": {name: file_digest(folder / name) for name in _FILES},
+        "digests": {name: file_digest(folder / name) for name in FILES},
     }
     write_json(folder / "scene.json", about)
 
@@ -102,8 +99,7 @@ def load_scene(folder: Path) -> Scene:
     Raises InputError when there is no scene, FormatError naming the file and the fact otherwise.
     """
     folder = Path(folder)
-    about = _read_about(folder / "scene.json")
-    _check_digests(folder, about)
+    about = check_scene(folder)
     gaussians = read_ply(folder / "splats.ply")
     radiance = _read_radiance(folder / "lights.safetensors", len(gaussians))
     try:
@@ -125,29 +121,6 @@ def load_scene(folder: Path) -> Scene:
             f"scene.json names {len(lamps)} lamps and ambient."
         )
     return scene
-
-
-def _read_about(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: {path.parent} is not a scene.")
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-        version = about["version"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise FormatError(f"{path} is not a scene description: {error!r}.") from error
-    if version != VERSION:
-        raise FormatError(f"{path} is of version {version}, this program reads {VERSION}.")
-    return about
-
-
-def _check_digests(folder: Path, about: dict[str, Any]) -> None:
-    digests = about.get("digests")
-    for name in _FILES:
-        expected = digests.get(name) if isinstance(digests, dict) else None
-        if not (folder / name).is_file():
-            raise FormatError(f"{folder / name} does not exist, scene.json lists it.")
-        if file_digest(folder / name) != expected:
-            raise FormatError(f"{folder / name} is damaged: scene.json lists another sha256.")
 
 
 def _read_radiance(path: Path, count: int) -> Float32[np.ndarray, "n m 3"]:
