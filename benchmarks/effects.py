@@ -76,13 +76,17 @@ def main() -> None:
         name = f"{path.parent.name}-{path.stem}"
         found[name] = measure(read_room(path), given.out / f"{name}.jpg")
         print(name, *(f"{r.effect} {r.seconds:.2f}/{r.seconds_other:.2f}" for r in found[name]))
+        # After every room: what a stopped run has measured is kept.
+        write(given.out, found)
+
+
+def write(out: Path, found: dict[str, list[Row]]) -> None:
+    """OUT/effects.json and the page OUT.md."""
     rows = {name: [asdict(row) for row in room] for name, room in found.items()}
     about = {"spp": SPP, "size": f"{2 * HEIGHT}x{HEIGHT}"}
-    write_json(given.out / "effects.json", {"version": 1, "about": about, "rooms": rows})
-    page = given.out.with_suffix(".md")
-    with atomic_file(page) as temporary:
-        temporary.write_text("\n".join(lines(found, given.out.name)) + "\n", encoding="utf-8")
-    print(page)
+    write_json(out / "effects.json", {"version": 1, "about": about, "rooms": rows})
+    with atomic_file(out.with_suffix(".md")) as temporary:
+        temporary.write_text("\n".join(lines(found, out.name)) + "\n", encoding="utf-8")
 
 
 def measure(room: Room, picture: Path) -> list[Row]:
@@ -98,7 +102,7 @@ def measure(room: Room, picture: Path) -> list[Row]:
         for (what, _, _), found in zip(variants, changed, strict=True)
     ]
     strips = [
-        _strip(f"{row.effect} ({row.decided})", first, found)
+        _strip(f"{row.effect} ({row.decided})".replace("→", "to"), first, found)
         for row, found in zip(rows, changed, strict=True)
     ]
     with atomic_file(picture) as temporary:
@@ -180,7 +184,8 @@ def lines(found: dict[str, list[Row]], folder: str) -> Iterator[str]:
         f"round: {2 * HEIGHT}×{HEIGHT} panoramas at {SPP} samples, CPU-seconds of Cycles on one "
         "thread (the usual way is the mean of two renders, before and after the others). *Saved* "
         "is what the decision saves: seconds the other way round minus seconds as decided; a "
-        "negative number is what a wanted effect costs. *Light* is how the photo's light changes the other way round. "
+        "negative number is what a wanted effect costs. *Light* is how the photo's light changes "
+        "the other way round. "
         "*Picture* is the mean difference of the displayed pictures, of 255, with the same random "
         "numbers; beside it the difference that other random numbers make."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from luxcore.files.atomic import atomic_file
 from luxcore.tradeoff.store import Measured, save_measured
 from luxcore.tradeoff.sweep import Point, Sweep, dominating, front
 
+LABEL_LETTERS = 40
+"""Of a line beside the axis; longer names of errors are broken."""
 ZERO_SHOWN = 1e-6
 """Where an error of zero is drawn: a logarithmic axis has no zero."""
 
@@ -75,9 +78,11 @@ def draw(path: Path, sweep: Sweep) -> None:
         plot.plot(
             [p.seconds for p in best], [_shown(p.error) for p in best], color="#c9b08a", zorder=1
         )
-        for point in sweep.points:
-            _draw_point(plot, point, is_default=point.label == sweep.default)
-        plot.set(xscale="log", yscale="log", xlabel="processor time, s", ylabel=sweep.error_name)
+        for place, point in enumerate(sorted(sweep.points, key=lambda p: p.seconds)):
+            # Neighbours in time have their names above and below in turn.
+            _draw_point(plot, point, place % 2 == 1, is_default=point.label == sweep.default)
+        error = textwrap.fill(sweep.error_name, LABEL_LETTERS)
+        plot.set(xscale="log", yscale="log", xlabel="processor time, s", ylabel=error)
         _spread_ticks(plot)
         plot.margins(0.2)
         plot.grid(alpha=0.2, which="both")
@@ -95,7 +100,7 @@ def _spread_ticks(plot: Any) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _draw_point(plot: Any, point: Point, *, is_default: bool) -> None:
+def _draw_point(plot: Any, point: Point, below: bool, *, is_default: bool) -> None:
     x, y = point.seconds, _shown(point.error)
     colour = "#9a5b00" if is_default else "#555"
     bars = (
@@ -105,7 +110,8 @@ def _draw_point(plot: Any, point: Point, *, is_default: bool) -> None:
     marker = {"marker": "*", "markersize": 12} if is_default else {"marker": "o", "markersize": 4}
     plot.errorbar(x, y, xerr=bars[0], yerr=bars[1], color=colour, elinewidth=0.8, **marker)
     label = f"{point.label} (default)" if is_default else point.label
-    plot.annotate(label, (x, y), (5, 5), textcoords="offset points", color=colour, fontsize=8)
+    offset = (5, -11) if below else (5, 5)
+    plot.annotate(label, (x, y), offset, textcoords="offset points", color=colour, fontsize=8)
 
 
 def _shown(error: float) -> float:

@@ -78,7 +78,9 @@ def _run_separate(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
 
 def _only(room: Room, lamp: int | None) -> Room:
     """The room lit by one lamp, or by what comes through its openings."""
-    parts = tuple(p if p.emits == 0 or p.lamp == lamp else replace(p, emits=0.0) for p in room.parts)
+    parts = tuple(
+        p if p.emits == 0 or p.lamp == lamp else replace(p, emits=0.0) for p in room.parts
+    )
     spots = tuple(spot for spot in room.spots if spot.lamp == lamp)
     environment = room.environment if lamp is None else None
     return replace(room, parts=parts, spots=spots, environment=environment)
