@@ -37,7 +37,7 @@ CURVES = (
         "relight",
         "psnr_lights",
         "How fast the lamps' light is found",
-        "PSNR of single lamps in held-out views, dB",
+        "PSNR of single lamps, held-out, dB",
         "stage 2, one line a capture: against the fused light of views that it was not fitted to",
     ),
 )
