@@ -11,7 +11,8 @@ typedef struct {
   V3 t;             // mean in camera axes; a point ahead where it is not valid
   V3 r0, r1, r2;    // rows of the rotation R
   V3 jw0, jw1;      // rows of J W
-  V3 row0, row1;    // rows of J W R S
+  V3 a0, a1;        // rows of J W R
+  V3 minors;        // a0 x a1
   V3 scale;
   F w, x, y, z;     // unit quaternion
   F quat_norm;
@@ -52,10 +53,10 @@ inline void linearise(Footprint *f, const float16 view, const float4 intrinsics,
   f->jw1 = jw1;
 }
 
-inline V3 spread(const Footprint *f, const V3 jw) {
-  const V3 r = {fma(jw.x, f->r0.x, fma(jw.y, f->r1.x, jw.z * f->r2.x)) * f->scale.x,
-                fma(jw.x, f->r0.y, fma(jw.y, f->r1.y, jw.z * f->r2.y)) * f->scale.y,
-                fma(jw.x, f->r0.z, fma(jw.y, f->r1.z, jw.z * f->r2.z)) * f->scale.z};
+inline V3 along_axes(const Footprint *f, const V3 jw) {
+  const V3 r = {fma(jw.x, f->r0.x, fma(jw.y, f->r1.x, jw.z * f->r2.x)),
+                fma(jw.x, f->r0.y, fma(jw.y, f->r1.y, jw.z * f->r2.y)),
+                fma(jw.x, f->r0.z, fma(jw.y, f->r1.z, jw.z * f->r2.z))};
   return r;
 }
 
@@ -85,13 +86,14 @@ Footprint footprint(const int first, const int n, const float16 view, const floa
   f.scale = scale;
   rotate(&f);
   linearise(&f, view, intrinsics, size);
-  f.row0 = spread(&f, f.jw0);
-  f.row1 = spread(&f, f.jw1);
-  const F xx = dot3(f.row0, f.row0), yy = dot3(f.row1, f.row1);
-  const V3 minors = {f.row0.y * f.row1.z - f.row0.z * f.row1.y,
-                     f.row0.z * f.row1.x - f.row0.x * f.row1.z,
-                     f.row0.x * f.row1.y - f.row0.y * f.row1.x};
-  f.xy = dot3(f.row0, f.row1);
+  f.a0 = along_axes(&f, f.jw0);
+  f.a1 = along_axes(&f, f.jw1);
+  f.minors = cross3(f.a0, f.a1);
+  const V3 row0 = times(f.a0, scale), row1 = times(f.a1, scale);
+  const F xx = dot3(row0, row0), yy = dot3(row1, row1);
+  const V3 areas = {scale.y * scale.z, scale.z * scale.x, scale.x * scale.y};
+  const V3 minors = times(f.minors, areas);  // row0 x row1
+  f.xy = dot3(row0, row1);
   f.det_sharp = dot3(minors, minors);
   f.det = fma(xx + yy, (F)EPS2D, f.det_sharp + EPS2D * EPS2D);
   f.xx = xx + EPS2D;

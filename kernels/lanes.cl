@@ -59,6 +59,10 @@ inline V3 times(const V3 a, const V3 b) {
   const V3 r = {a.x * b.x, a.y * b.y, a.z * b.z};
   return r;
 }
+inline V3 cross3(const V3 a, const V3 b) {
+  const V3 r = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  return r;
+}
 inline V3 weighted(const F j, const V3 a, const F k, const V3 b) {
   const V3 r = {fma(j, a.x, k * b.x), fma(j, a.y, k * b.y), fma(j, a.z, k * b.z)};
   return r;

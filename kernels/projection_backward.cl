@@ -8,50 +8,75 @@
 #line 9 "projection_backward.cl"
 
 typedef struct {
-  F x, y;        // dL/d mean2d
-  F xx, xy, yy;  // dL/d cov2d, symmetric: xy is one of two equal entries
+  F x, y;                    // dL/d mean2d
+  V3 d_a0, d_a1;             // dL/d (J W R)
+  V3 d_log_scale, d_turn;    // by the log-scales; by a turn about each axis of the Gaussian
 } ScreenGradient;
 
+// B = cov2d^-1 A without cancellation, cov2d = A S S A^T + e I of determinant `det`, A = J W R: by
+// the triple product, |r1|^2 r0 - (r0 r1) r1 = r1 x (r0 x r1) for the rows r of A S. Taken from the
+// entries of cov2d^-1, a needle's long axis would be the difference of numbers as much larger as
+// the needle is longer than a pixel.
+inline void whiten(const Footprint *f, const V3 squares, const F e, const F det, V3 *b0, V3 *b1) {
+  const F inverse = 1.0f / det;
+  *b0 = weighted(inverse, cross3(times(f->a1, squares), f->minors), e * inverse, f->a0);
+  *b1 = weighted(inverse, cross3(f->minors, times(f->a0, squares)), e * inverse, f->a1);
+}
+
 // ln alpha = ln opacity - (a dx^2 + c dy^2) / 2 - b dx dy with the conic [[a, b], [b, c]] = cov2d^-1,
-// so d_cov = -conic V conic, V = -1/2 [[h dx^2, h dx dy], [h dx dy, h dy^2]].
+// so d_cov = conic V conic, V = 1/2 [[h dx^2, h dx dy], [h dx dy, h dy^2]]. With B = conic A,
+//   dL/dA = 2 conic V B S^2, dL/d log s_k = H_kk s_k^2, H = 2 B^T V B,
+// and a turn about axis x of the Gaussian changes the loss by H_yz (s_y^2 - s_z^2).
 ScreenGradient screen_gradient(const Footprint *f, __global const float *moments, const int first,
                                const int n) {
   const F inverse = 1.0f / f->det;
   const F a = f->yy * inverse, b = -f->xy * inverse, c = f->xx * inverse;
   const F hx = load_field(moments, first, n, 8, 1), hy = load_field(moments, first, n, 8, 2);
-  const F va = 0.5f * load_field(moments, first, n, 8, 3);
-  const F vb = 0.5f * load_field(moments, first, n, 8, 4);
-  const F vc = 0.5f * load_field(moments, first, n, 8, 5);
-  const F p00 = a * va + b * vb, p01 = a * vb + b * vc;
-  const F p10 = b * va + c * vb, p11 = b * vb + c * vc;
-  ScreenGradient g = {-(a * hx + b * hy), -(b * hx + c * hy), p00 * a + p01 * b,
-                      p00 * b + p01 * c, p10 * b + p11 * c};
+  const F va = load_field(moments, first, n, 8, 3), vb = load_field(moments, first, n, 8, 4);
+  const F vc = load_field(moments, first, n, 8, 5);
+  const V3 squares = times(f->scale, f->scale);
+  V3 b0, b1;
+  whiten(f, squares, EPS2D, f->det, &b0, &b1);
+  const V3 y0 = weighted(va, b0, vb, b1), y1 = weighted(vb, b0, vc, b1);  // 2 V B
+  ScreenGradient g;
+  g.x = -(a * hx + b * hy);
+  g.y = -(b * hx + c * hy);
+  g.d_a0 = times(weighted(a, y0, b, y1), squares);
+  g.d_a1 = times(weighted(b, y0, c, y1), squares);
+  const V3 diagonal = {b0.x * y0.x + b1.x * y1.x, b0.y * y0.y + b1.y * y1.y,
+                       b0.z * y0.z + b1.z * y1.z};
+  g.d_log_scale = times(diagonal, squares);
+  g.d_turn.x = (b0.y * y0.z + b1.y * y1.z) * (squares.y - squares.z);
+  g.d_turn.y = (b0.z * y0.x + b1.z * y1.x) * (squares.z - squares.x);
+  g.d_turn.z = (b0.x * y0.y + b1.x * y1.y) * (squares.x - squares.y);
 #if ANTIALIASED
   // d ln sqrt(det_sharp / det) / d cov = (cov_sharp^-1 - cov^-1) / 2, nothing at the floor.
   const I above = f->det_sharp > COMPENSATION_MIN * COMPENSATION_MIN * f->det;
-  const F k = above ? 0.5f * load_field(moments, first, n, 8, 0) : (F)0.0f;
-  const F sharp = 1.0f / (above ? f->det_sharp : (F)1.0f);
-  g.xx += k * ((f->yy - EPS2D) * sharp - a);
-  g.xy += k * (-f->xy * sharp - b);
-  g.yy += k * ((f->xx - EPS2D) * sharp - c);
+  const F k = above ? load_field(moments, first, n, 8, 0) : (F)0.0f;
+  V3 s0, s1;
+  whiten(f, squares, 0.0f, above ? f->det_sharp : (F)1.0f, &s0, &s1);
+  const V3 e0 = times(weighted(k, s0, -k, b0), squares);
+  const V3 e1 = times(weighted(k, s1, -k, b1), squares);
+  g.d_a0 = weighted((F)1.0f, g.d_a0, (F)1.0f, e0);
+  g.d_a1 = weighted((F)1.0f, g.d_a1, (F)1.0f, e1);
+  const V3 own = weighted((F)1.0f, times(f->a0, e0), (F)1.0f, times(f->a1, e1));
+  g.d_log_scale = weighted((F)1.0f, g.d_log_scale, (F)1.0f, own);
+  g.d_turn.x += f->a0.z * e0.y + f->a1.z * e1.y - f->a0.y * e0.z - f->a1.y * e1.z;
+  g.d_turn.y += f->a0.x * e0.z + f->a1.x * e1.z - f->a0.z * e0.x - f->a1.z * e1.x;
+  g.d_turn.z += f->a0.y * e0.x + f->a1.y * e1.x - f->a0.x * e0.y - f->a1.x * e1.y;
 #endif
   return g;
 }
 
-// Through R(q / |q|): g0, g1, g2 are the rows of dL/dR.
-void quaternion_gradient(const Footprint *f, const V3 g0, const V3 g1, const V3 g2, F *d_quat) {
+// Through the normalisation of q: a turn by t about the Gaussian's axes moves the unit quaternion by
+// q (0, t / 2), which is orthogonal to q.
+void quaternion_gradient(const Footprint *f, const V3 d_turn, F *d_quat) {
   const F w = f->w, x = f->x, y = f->y, z = f->z;
-  const F yz = g2.y - g1.z, zx = g0.z - g2.x, xy = g1.x - g0.y;
-  const F sx = g1.z + g2.y, sy = g0.z + g2.x, sz = g0.y + g1.x;
-  const F dw = 2.0f * (x * yz + y * zx + z * xy);
-  const F dx = 2.0f * (w * yz - 2.0f * x * (g1.y + g2.z) + y * sz + z * sy);
-  const F dy = 2.0f * (w * zx + x * sz - 2.0f * y * (g0.x + g2.z) + z * sx);
-  const F dz = 2.0f * (w * xy + x * sy + y * sx - 2.0f * z * (g0.x + g1.y));
-  const F along = dw * w + dx * x + dy * y + dz * z, inverse = 1.0f / f->quat_norm;
-  d_quat[0] = (dw - along * w) * inverse;
-  d_quat[1] = (dx - along * x) * inverse;
-  d_quat[2] = (dy - along * y) * inverse;
-  d_quat[3] = (dz - along * z) * inverse;
+  const V3 t = scaled(d_turn, 2.0f / f->quat_norm);
+  d_quat[0] = -(t.x * x + t.y * y + t.z * z);
+  d_quat[1] = t.x * w - t.y * z + t.z * y;
+  d_quat[2] = t.x * z + t.y * w - t.z * x;
+  d_quat[3] = -t.x * y + t.y * x + t.z * w;
 }
 
 // dL/dt of the mean in camera axes: through mean2d, the Jacobian and the depth.
@@ -98,20 +123,11 @@ __kernel void project_gaussians_backward(
                     (1.0f + exp_f(load_field(opacity_logits, first, n, 1, 0)));
   store_field(drawn ? d_logit : (F)0.0f, d_opacity_logits, first, n, 1, 0);
 
-  // cov2d = rows rows^T, rows = (J W) (R S)
-  const V3 d_row0 = weighted(2.0f * g.xx, f.row0, 2.0f * g.xy, f.row1);
-  const V3 d_row1 = weighted(2.0f * g.xy, f.row0, 2.0f * g.yy, f.row1);
-  const V3 e0 = times(d_row0, f.scale), e1 = times(d_row1, f.scale);
-  const V3 d_jw0 = {dot3(e0, f.r0), dot3(e0, f.r1), dot3(e0, f.r2)};
-  const V3 d_jw1 = {dot3(e1, f.r0), dot3(e1, f.r1), dot3(e1, f.r2)};
-  const V3 g0 = weighted(f.jw0.x, e0, f.jw1.x, e1);  // rows of dL/dR
-  const V3 g1 = weighted(f.jw0.y, e0, f.jw1.y, e1);
-  const V3 g2 = weighted(f.jw0.z, e0, f.jw1.z, e1);
-  const V3 s0 = times(g0, f.r0), s1 = times(g1, f.r1), s2 = times(g2, f.r2);
-  const V3 d_log_scale = {s0.x + s1.x + s2.x, s0.y + s1.y + s2.y, s0.z + s1.z + s2.z};
-  store_v3(only(drawn, d_log_scale), d_log_scales, first, n);
+  const V3 d_jw0 = {dot3(g.d_a0, f.r0), dot3(g.d_a0, f.r1), dot3(g.d_a0, f.r2)};
+  const V3 d_jw1 = {dot3(g.d_a1, f.r0), dot3(g.d_a1, f.r1), dot3(g.d_a1, f.r2)};
+  store_v3(only(drawn, g.d_log_scale), d_log_scales, first, n);
   F d_quat[4];
-  quaternion_gradient(&f, g0, g1, g2, d_quat);
+  quaternion_gradient(&f, g.d_turn, d_quat);
   for (int k = 0; k < 4; ++k)
     store_field(drawn ? d_quat[k] : (F)0.0f, d_quats, first, n, 4, k);
   const V3 d_mean = camera_gradient(&f, &g, d_jw0, d_jw1, load_field(moments, first, n, 8, 6), view,
