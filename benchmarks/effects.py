@@ -180,14 +180,15 @@ def lines(found: dict[str, list[Row]], folder: str) -> Iterator[str]:
     yield ""
     yield (
         "Each room is analysed before it is rendered (`luxcore/render/effects.py`); what it does "
-        "not call for is left off. Here every decision of every room of a default run was turned "
+        "not call for is left off. Here every decision of each room below was turned "
         f"round: {2 * HEIGHT}×{HEIGHT} panoramas at {SPP} samples, CPU-seconds of Cycles on one "
         "thread (the usual way is the mean of two renders, before and after the others). *Saved* "
         "is what the decision saves: seconds the other way round minus seconds as decided; a "
         "negative number is what a wanted effect costs. *Light* is how the photo's light changes "
         "the other way round. "
         "*Picture* is the mean difference of the displayed pictures, of 255, with the same random "
-        "numbers; beside it the difference that other random numbers make."
+        "numbers; beside it the difference that other random numbers make. The clock of a shared "
+        "machine repeats to about ±10 %: smaller savings are no result."
     )
     yield ""
     yield (
