@@ -35,7 +35,7 @@ from luxcore.splats.ply import write_ply
 from luxcore.splats.rates import Rates
 from luxcore.splats.views import Split, Views, load_views, split_views
 
-_VERSION = 1
+_VERSION = 2
 """Raised when the same settings would no longer give the same Gaussians."""
 _DENSITY_START, _DENSITY_STOP = 0.08, 0.65
 """Shares of a run between which Gaussians are added and removed; the rest only settles them."""
