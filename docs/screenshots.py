@@ -18,21 +18,28 @@ from luxcore.viewer.app import Viewer
 from luxcore.viewer.open import open_scene
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, BrowserContext
 
 CHROMIUM = "/usr/bin/chromium"
 QUALITY = 85
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
+GOTO_MS = 180_000
+"""The dashboards' scripts are megabytes, and this machine may be busy."""
+OFFLINE = ["--no-sandbox", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
+"""Pages that ask for anything elsewhere are told at once that there is nothing."""
+ARGUMENTS = [*OFFLINE, "--use-gl=angle", "--use-angle=swiftshader"]
 EVENING = "split=40&l1=0,0,o"
 """The first lamp off, the photo on the left."""
 
 
-def shoot(browser: Browser, address: str, out: Path, size: tuple[int, int], wait_ms: int) -> None:
+def shoot(
+    browser: Browser | BrowserContext, address: str, out: Path, size: tuple[int, int], wait_ms: int
+) -> None:
     """One page as a picture."""
-    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-    page.goto(address)
+    page = browser.new_page()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.goto(address, timeout=GOTO_MS)
     page.wait_for_timeout(wait_ms)
-    page.screenshot(path=str(out), type="jpeg", quality=QUALITY)
+    page.screenshot(path=str(out), type="jpeg", quality=QUALITY, timeout=GOTO_MS)
     page.close()
     print(out)
 
@@ -58,8 +65,9 @@ def shoot_mlflow(browser: Browser, address: str, out: Path, wait_ms: int) -> Non
         "system": f"{run}/system-metrics",
         "pictures": f"{run}/artifacts",
     }
+    context = browser.new_context()
     for name, page in pages.items():
-        shoot(browser, page, out / f"mlflow_{name}.jpg", (1400, 860), wait_ms)
+        shoot(context, page, out / f"mlflow_{name}.jpg", (1400, 860), wait_ms)
 
 
 def shoot_prefect(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
@@ -72,8 +80,9 @@ def shoot_prefect(browser: Browser, address: str, out: Path, wait_ms: int) -> No
     }
     run = f"{address}/runs/flow-run/{ask(f'{address}/api/flow_runs/filter', query)[0]['id']}"
     pages = {"flow": run, "artifacts": f"{run}?tab=Artifacts", "runs": f"{address}/runs"}
+    context = browser.new_context()
     for name, page in pages.items():
-        shoot(browser, page, out / f"prefect_{name}.jpg", (1400, 860), wait_ms)
+        shoot(context, page, out / f"prefect_{name}.jpg", (1400, 860), wait_ms)
 
 
 def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:

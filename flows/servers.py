@@ -19,8 +19,8 @@ from luxcore.lifetime import die_with_parent
 from tasks.tracking import tracking_uri
 
 HOST = "127.0.0.1"
-START_S = 180.0
-"""A first start creates databases: Prefect takes half a minute of CPU for it."""
+START_S = 600.0
+"""A first start creates databases: half a minute of CPU, many minutes on a machine that is busy."""
 STOP_S = 10.0
 
 
