@@ -72,7 +72,7 @@ class Viewer:
             self._run, self._complain
         )
         self.panel = Panel(self.server.gui, viewed.scene, viewed.thumbnails, self._lighting_changed)
-        FilesMenu(self, out)
+        self.files = FilesMenu(self, out)
         if viewed.cameras:
             place_browser(self.server.initial_camera, viewed.cameras[0], _depth(viewed))
         self.server.on_client_connect(self._connected)

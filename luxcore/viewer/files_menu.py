@@ -39,8 +39,8 @@ class FilesMenu:
             self._view.on_update(self._go_to_photo)
             gui.add_button("Add keyframe").on_click(self._add_keyframe)
             gui.add_button("Clear keyframes").on_click(self._clear_keyframes)
-            self._seconds = gui.add_slider("seconds", 1, 30, 1, 4)
-            self._fps = gui.add_slider("frames a second", 5, 60, 1, 24)
+            self.seconds = gui.add_slider("seconds", 1, 30, 1, 4)
+            self.fps = gui.add_slider("frames a second", 5, 60, 1, 24)
             self._loop = gui.add_checkbox("loop", False)
             gui.add_button("Render film", hint="PNG pictures and an MP4").on_click(self._film)
             gui.add_button("Stop film").on_click(lambda _: viewer.films.cancel(FILM_KEY))
@@ -77,7 +77,7 @@ class FilesMenu:
         self._viewer.tab(event.client).keyframes.clear()
 
     def _film(self, event: Any) -> None:
-        client, fps = event.client, int(self._fps.value)
+        client, fps = event.client, int(self.fps.value)
         keyframes = self._viewer.tab(client).keyframes
         if len(keyframes) < 2:
             body = (
@@ -85,7 +85,7 @@ class FilesMenu:
             )
             client.add_notification("No film yet", body, color="red")
             return
-        frames = fps * int(self._seconds.value)
+        frames = fps * int(self.seconds.value)
         cameras = camera_path(keyframes, frames, loop=bool(self._loop.value))
         self._viewer.films.submit(
             FILM_KEY, lambda is_current: self._write_film(client, cameras, fps, is_current)

@@ -93,7 +93,9 @@ def test_a_film_has_its_pictures_and_can_be_stopped(tmp_path: Path) -> None:
     scene = room_scene()
     renderer, lighting = ExactRenderer(scene), original_lighting(scene)
     shots = [Shot(CAMERA, lighting)] * 3
-    film = write_film(tmp_path / "film", renderer, shots, 12, lambda: True)
+    told: list[int] = []
+    film = write_film(tmp_path / "film", renderer, shots, 12, lambda: True, told.append)
+    assert told == [0, 1, 2]
     assert sorted(p.name for p in film.parent.iterdir()) == [
         "0000.png", "0001.png", "0002.png", "film.mp4",
     ]  # fmt: skip
