@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from luxcore.statistics.contact_sheet import write_contact_sheet
 from luxcore.render.dataset import render_dataset
+from luxcore.statistics.contact_sheet import write_contact_sheet
 from tasks.context import StageContext
 
 

@@ -18,14 +18,14 @@ cp "$out/rooms/manifest.json" "$weights/data_manifest.json"
 
 train geometry64 geometry --rooms 100 --groups 280 --sketches 0 --size 64 --photos 12 --steps 2400
 install_weights geometry64 geometry
-train sv64 sv --rooms 130 --groups 390 --sketches 60 --size 64 --steps 7000
+train sv64 sv --rooms 130 --groups 390 --sketches 60 --size 64 --steps 4500
 
 train geometry geometry --base "$out/geometry64/model.safetensors" --rooms 100 --groups 280 \
     --sketches 0 --photos 12 --steps 800 --rate 1e-3
 install_weights geometry geometry
-train sv sv --base "$out/sv64/model.safetensors" --rooms 130 --groups 390 --sketches 60 \
-    --steps 2000 --rate 7e-4
+train sv sv --base "$out/sv64/model.safetensors" --rooms 230 --groups 900 --sketches 60 \
+    --steps 900 --rate 1e-3
 install_weights sv sv
 
-train mv mv --rooms 130 --groups 200 --sketches 60 --size 64 --photos 4 --steps 2000 --rate 1e-3
+train mv mv --rooms 130 --groups 160 --sketches 40 --size 64 --photos 4 --steps 1000 --rate 1e-3
 install_weights mv mv
