@@ -50,11 +50,15 @@ class FitSettings:
     ema: float = 0.995
     bf16: bool = True
     check_every: int = 200
+    best_by: str = "psnr_validation"
+    """The score, higher being better, whose best check gives the weights. Small networks on few
+    rooms are past their best before the rate has fallen to zero."""
 
 
 @dataclass
 class FitResult:
-    """The averaged weights and the curve: one row per check."""
+    """The averaged weights of the best check (of the last where none was scored), and the curve:
+    one row per check."""
 
     weights: dict[str, Tensor]
     curve: list[dict[str, float]]
@@ -81,7 +85,7 @@ def fit(
                 state.check()
                 if checkpoint is not None:
                     state.save(checkpoint)
-    return FitResult(state.ema, state.curve)
+    return FitResult(state.best or state.ema, state.curve)
 
 
 class _Fit:
@@ -99,6 +103,7 @@ class _Fit:
         self.ema = {k: v.detach().clone() for k, v in net.state_dict().items()}
         self.step, self.lamps, self.loss = 0, 0, math.nan
         self.curve: list[dict[str, float]] = []
+        self.best: dict[str, Tensor] = {}
 
     def advance(self, batch: Sequence[tuple[Tensor, Any]]) -> float:
         """One step on all lamps of a batch of photos."""
@@ -133,6 +138,10 @@ class _Fit:
             "loss": self.loss,
             **self.validate(averaged.eval()),
         }
+        before = [r[self.settings.best_by] for r in self.curve if self.settings.best_by in r]
+        score = row.get(self.settings.best_by)
+        if score is not None and score > max(before, default=-math.inf):
+            self.best = {name: value.clone() for name, value in self.ema.items()}
         self.curve.append(row)
         self.net.train(own)
 
@@ -141,6 +150,7 @@ class _Fit:
         state = {
             "net": self.net.state_dict(),
             "ema": self.ema,
+            "best": self.best,
             "optimizer": self.optimizer.state_dict(),
             "numbers": [self.step, self.lamps, self.loss],
             "curve": self.curve,
@@ -152,7 +162,7 @@ class _Fit:
         """The inverse of `save`."""
         self.net.load_state_dict(state["net"])
         self.optimizer.load_state_dict(state["optimizer"])
-        self.ema, self.curve = state["ema"], state["curve"]
+        self.ema, self.best, self.curve = state["ema"], state["best"], state["curve"]
         step, lamps, self.loss = state["numbers"]
         self.step, self.lamps = int(step), int(lamps)
 

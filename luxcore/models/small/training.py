@@ -197,7 +197,7 @@ def _train(
     before = mean_psnr(net.eval(), cases)
     original = {name: value.detach().clone() for name, value in net.state_dict().items()}
     result = _fit(net, batches, settings, lambda n: lamp_scores(n, cases), checkpoint)
-    after = result.curve[-1]["psnr_validation"] if result.curve else before
+    after = max((row["psnr_validation"] for row in result.curve), default=before)
     improved = after > before
     chosen = result.weights if improved else original
     net.load_state_dict(chosen)
