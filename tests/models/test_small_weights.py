@@ -105,11 +105,11 @@ def test_backends_are_opened_by_name(tmp_path: Path) -> None:
 
 def test_model_cards_name_what_the_weights_came_from() -> None:
     folder = shipped_weights("sv").parent
-    for kind in ("sv", "mv"):
+    for kind in ("sv", "mv", "geometry"):
         card = (folder / f"{kind}.md").read_text(encoding="utf-8")
         for word in ("command", "seed", "parameters", "Limits", "curve"):
             assert word in card, f"{kind}.md says nothing about {word}"
     manifest = json.loads((folder / "data_manifest.json").read_text(encoding="utf-8"))
-    splits = np.array([room["split"] for room in manifest["rooms"]])
-    seeds = np.array([room["seed"] for room in manifest["rooms"]])
+    splits = np.array([room["split"] for room in manifest["panoramas"]])
+    seeds = np.array([room["seed"] for room in manifest["panoramas"]])
     assert not set(seeds[splits == "train"]) & set(seeds[splits == "test"])
