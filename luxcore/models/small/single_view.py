@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ class SmallDecomposer:
             part = self.decompose(image_linear, masks[seen], on[seen], geometry, seed)
             return with_unseen(part, seen)
         height, width = image_linear.shape[:2]
-        size = grid_size(height, width, self.long_side_px, self.net.shape.stride)
+        size = grid_size(height, width, self.long_side_px, self._stride())
         small = photo_to_grid(image_linear, size)
         burning = torch.from_numpy(on)
         surfaces = geometry_to_grid(geometry, size)
@@ -60,6 +61,10 @@ class SmallDecomposer:
         features = lamp_features(small, masks_to_grid(masks, size), burning, surfaces)
         fields = run_network(self.net, features, burning)
         return finish(fields, small, image_linear, masks, burning)
+
+    def _stride(self) -> int:
+        """Sides of the grid are multiples of what both networks need."""
+        return math.lcm(*(n.shape.stride for n in (self.net, self.estimator) if n is not None))
 
 
 def run_network(
