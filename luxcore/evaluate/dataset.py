@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from luxcore.data.compact import list_rendered
+from luxcore.data.compact import holds_compact, list_rendered
 from luxcore.data.store import AnyView
 from luxcore.errors import InputError
 
@@ -20,7 +20,7 @@ def evaluation_views(dataset: Path) -> Sequence[AnyView]:
     if not dataset.exists():
         raise InputError(f"{dataset} does not exist.")
     root = dataset / "test" if (dataset / "test").is_dir() else dataset
-    if root.is_dir() and any(root.rglob("*.masks.exr")):
+    if holds_compact(root):
         return list_rendered(root)
     from luxcore.data.public_reader import public_views
 

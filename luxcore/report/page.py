@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from luxcore.errors import InputError
-from luxcore.files.atomic import atomic_file
+from luxcore.files.pages import write_page_from
 from luxcore.report.gallery import Gallery
 from luxcore.report.sections import all_sections
 
@@ -24,24 +22,17 @@ def write_report(artifacts: Path, out: Path, provenance: dict[str, Any]) -> Path
     sections = list(all_sections(artifacts, Gallery(out), provenance))
     if not any(section.anchor != "provenance" for section in sections):
         raise InputError(f"{artifacts} holds no results of any stage to report.")
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    css = (Path(__file__).parent / "templates" / "report.css").read_text(encoding="utf-8")
-    text = environment.get_template("report.html").render(
+    templates = Path(__file__).parent / "templates"
+    css = (templates / "report.css").read_text(encoding="utf-8")
+    return write_page_from(
+        templates / "report.html",
+        out / "index.html",
         sections=sections,
         facts=provenance,
         stages=provenance.get("stages", {}),
         css=css,
         extras=_extras(out),
     )
-    with atomic_file(out / "index.html") as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return out / "index.html"
 
 
 def _extras(out: Path) -> list[str]:

@@ -7,11 +7,10 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.files.atomic import atomic_file
+from luxcore.files.pages import write_page_from
 from luxcore.statistics.charts import short
 from luxcore.statistics.facts import LampFacts, ViewFacts
 from luxcore.statistics.summary import charts
@@ -24,14 +23,10 @@ def write_page(
     path: Path, title: str, views: Sequence[ViewFacts], sheet: Float[np.ndarray, "h w 3"]
 ) -> Path:
     """Write `path`, which needs no other file. `sheet` is the contact sheet, display values."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("statistics.html").render(
+    template = Path(__file__).parent / "templates" / "statistics.html"
+    return write_page_from(
+        template,
+        Path(path),
         title=title,
         headline=headline(views),
         sheet=_data_uri(sheet),
@@ -39,9 +34,6 @@ def write_page(
         rows=[(name, *quantiles(values)) for name, values in measures(views).items()],
         remarks=remarks(views),
     )
-    with atomic_file(Path(path)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return Path(path)
 
 
 def headline(views: Sequence[ViewFacts]) -> dict[str, str]:

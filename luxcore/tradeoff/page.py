@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from luxcore.files.atomic import atomic_file
+from luxcore.files.pages import write_page_from
 from luxcore.tradeoff.store import Measured, save_measured
 from luxcore.tradeoff.sweep import Point, Sweep, dominating, front
 
@@ -44,22 +43,15 @@ def write_tradeoffs(out: Path, measured: Measured) -> Path:
             draw(temporary, sweep)
         knobs.setdefault(sweep.knob, []).append(shown)
     _remove_stale(out, {shown.picture for group in knobs.values() for shown in group})
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("tradeoff.html").render(
+    template = Path(__file__).parent / "templates" / "tradeoff.html"
+    return write_page_from(
+        template,
+        out / "tradeoff.html",
         knobs=knobs,
         about=measured.about,
         trials=measured.trials,
         scenes=sorted({sweep.scene for sweep in measured.sweeps}),
     )
-    with atomic_file(out / "tradeoff.html") as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return out / "tradeoff.html"
 
 
 def draw(path: Path, sweep: Sweep) -> None:
