@@ -11,7 +11,7 @@ Image = Float[np.ndarray, "h w 3"]
 def relative_noise(noisy: Image, denoised: Image, leave_out: Bool[np.ndarray, "h w"]) -> float:
     """Mean absolute residual of the denoiser over the mean radiance; 0 is free of noise.
 
-    `leave_out`: pixels that emit. They are bright and clean, and would hide the rest.
+    `leave_out`: pixels that emit and their rim: bright and clean, they would hide the rest.
     """
     rest = ~leave_out
     level = float(denoised[rest].mean()) if rest.any() else 0.0

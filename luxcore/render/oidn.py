@@ -66,14 +66,18 @@ class Denoiser:
 
 
 def keep_energy(
-    noisy: Image, denoised: Image, emitter: Bool[np.ndarray, "h w"]
+    noisy: Image,
+    denoised: Image,
+    emitter: Bool[np.ndarray, "h w"],
+    rim: Bool[np.ndarray, "h w"],
 ) -> tuple[Image, float]:
     """Scale the denoised image to the noisy mean (the filter loses 8-20 % of sparse light).
 
-    Emitting pixels are nearly free of noise and so bright that they would hide the loss: they
-    stay out of the mean and keep their brightness. Returns the image and the factor (0.5..2).
+    `emitter` keeps its brightness: it is nearly free of noise. `rim`, the pixels around it, holds
+    light of the emitter that the pixel filter and the denoiser spread: so bright that it would
+    hide the loss, hence both stay out of the means. Returns the image and the factor (0.5..2).
     """
-    rest = ~emitter
+    rest = ~(emitter | rim)
     before = float(noisy[rest].mean()) if rest.any() else 0.0
     after = float(denoised[rest].mean()) if rest.any() else 0.0
     factor = float(np.clip(before / after, 0.5, 2.0)) if after > 0 else 1.0

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from luxcore.light.blackbody import blackbody_rgb, jitter_hsv
+from luxcore.rooms.decor import picture
 from luxcore.rooms.dice import Rng, between, chance, pick
 from luxcore.rooms.lamps import ceiling, standing, wall
 from luxcore.rooms.lamps.design import LampPiece
@@ -131,11 +132,30 @@ def _add_ceiling(
 
 def _add_wall(rng: Rng, layout: Layout, palette: Palette, fittings: Fittings, off: float) -> None:
     piece = wall.draw(rng, palette)
+    if piece.design == "picture_light":
+        _add_picture_light(rng, layout, palette, fittings, off, piece)
+        return
     z = between(rng, 1.55, 1.95)
     half = piece.height / 2 + 0.05
     found = layout.on_wall(rng, max(0.25, 2 * piece.radius), z - half, z + half)
     if found is not None:
         side = layout.plan.walls[found[0]]
+        fittings.add(rng, "wall", piece, (*side.point(found[1]), z), side.yaw_deg, off)
+
+
+def _add_picture_light(
+    rng: Rng, layout: Layout, palette: Palette, fittings: Fittings, off: float, piece: LampPiece
+) -> None:
+    """The lamp and, below it, the picture that it is there for."""
+    width = round(2 * piece.radius * between(rng, 1.1, 1.9), 4)
+    height = between(rng, 0.35, 0.7)
+    middle = between(rng, 1.4, 1.6)
+    z = middle + height / 2 + 0.06
+    found = layout.on_wall(rng, width, middle - height / 2, z + piece.height)
+    if found is not None:
+        side = layout.plan.walls[found[0]]
+        hung = picture(rng, palette, width, height)
+        fittings.parts += placed(hung, (*side.point(found[1]), middle), side.yaw_deg)
         fittings.add(rng, "wall", piece, (*side.point(found[1]), z), side.yaw_deg, off)
 
 

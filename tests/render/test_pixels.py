@@ -15,6 +15,7 @@ from luxcore.errors import FormatError, InputError, LuxError
 from luxcore.files.exr import write_exr
 from luxcore.render.compact import KEY_LUMINANCE, photo_exposure
 from luxcore.render.hdri import blender_hdri_folder, hdri_path, mean_luminance
+from luxcore.render.masks import dilated
 from luxcore.render.noise import joined, relative_noise
 from luxcore.render.oidn import Denoiser, keep_energy
 from luxcore.render.process import BlenderProcess
@@ -30,7 +31,7 @@ def test_energy_is_kept_outside_of_emitters() -> None:
     emitter[:4, :4] = True
     noisy[emitter] = 100.0
     dark = np.where(emitter[..., None], noisy, noisy * 0 + 0.15).astype(np.float32)
-    kept, factor = keep_energy(noisy, dark, emitter)
+    kept, factor = keep_energy(noisy, dark, emitter, emitter)
     assert kept[~emitter].mean() == pytest.approx(noisy[~emitter].mean(), rel=1e-5)
     assert (kept[emitter] == 100.0).all()
     assert factor > 1.2
@@ -39,12 +40,25 @@ def test_energy_is_kept_outside_of_emitters() -> None:
 def test_energy_factor_is_bounded_and_black_stays_black() -> None:
     black = np.zeros((8, 8, 3), np.float32)
     nowhere = np.zeros((8, 8), bool)
-    kept, factor = keep_energy(black, black, nowhere)
+    kept, factor = keep_energy(black, black, nowhere, nowhere)
     assert factor == 1.0
     assert not kept.any()
     firefly = black.copy()
     firefly[0, 0] = 1e4
-    assert keep_energy(firefly, black + np.float32(0.1), nowhere)[1] == 2.0
+    assert keep_energy(firefly, black + np.float32(0.1), nowhere, nowhere)[1] == 2.0
+
+
+def test_the_spread_rim_of_a_bulb_does_not_rule_the_energy() -> None:
+    rng = np.random.Generator(np.random.PCG64(2))
+    noisy = rng.exponential(0.2, (64, 64, 3)).astype(np.float32)
+    bulb = np.zeros((64, 64), bool)
+    bulb[30:32, 30:32] = True
+    noisy[29:33, 29:33] = 5e3
+    denoised = np.full_like(noisy, 0.2)
+    denoised[28:34, 28:34] = 3e3
+    rim = dilated(dilated(bulb, wraps=False), wraps=False)
+    assert keep_energy(noisy, denoised, bulb, rim)[1] == pytest.approx(1.0, abs=0.02)
+    assert keep_energy(noisy, denoised, bulb, bulb)[1] < 0.7
 
 
 def test_denoiser_removes_noise_and_has_the_same_bits_on_two_threads() -> None:

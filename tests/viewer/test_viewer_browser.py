@@ -69,9 +69,15 @@ def wait_until(page: Page, checkbox: int, *, checked: bool) -> None:
     )
 
 
-def shown(viewer: Viewer) -> np.ndarray:
-    assert viewer.fast.drain(20.0)
-    return np.asarray(viewer._node.rgbs) / 255.0
+def until_shown(page: Page, viewer: Viewer, settings: dict[str, LampSetting]) -> None:
+    """Wait for the colours of `settings`: the widgets hold their values before colours follow."""
+    wanted = expected(settings)
+    for _ in range(200):
+        colours = np.asarray(viewer._node.rgbs) / 255.0
+        if np.allclose(colours, wanted, rtol=0, atol=0.51 / 255 + 1e-4):
+            return
+        page.wait_for_timeout(100)
+    np.testing.assert_allclose(colours, wanted, atol=0.51 / 255 + 1e-4)
 
 
 def expected(settings: dict[str, LampSetting]) -> np.ndarray:
@@ -81,14 +87,13 @@ def expected(settings: dict[str, LampSetting]) -> np.ndarray:
 
 def test_a_switch_in_one_tab_relights_both(viewer: Viewer, open_tab: Callable[[], Page]) -> None:
     first, second = open_tab(), open_tab()
-    np.testing.assert_allclose(shown(viewer), expected({}), atol=0.51 / 255 + 1e-4)
+    until_shown(first, viewer, {})
     first.get_by_role("checkbox").nth(DESK_ON).uncheck()
     wait_until(second, DESK_ON, checked=False)
-    dark = expected({"desk": LampSetting(0.0)})
-    np.testing.assert_allclose(shown(viewer), dark, atol=0.51 / 255 + 1e-4)
+    until_shown(second, viewer, {"desk": LampSetting(0.0)})
     second.get_by_role("button", name="Original lighting").click()
     wait_until(first, DESK_ON, checked=True)
-    np.testing.assert_allclose(shown(viewer), expected({}), atol=0.51 / 255 + 1e-4)
+    until_shown(first, viewer, {})
 
 
 def test_at_rest_the_exact_picture_is_shown_and_said(

@@ -22,7 +22,7 @@ from luxcore.render.blender.scene import (
 )
 from luxcore.render.compact import rendered_view
 from luxcore.render.effects import Effects, analyse_effects
-from luxcore.render.masks import lamp_masks
+from luxcore.render.masks import dilated, lamp_masks
 from luxcore.render.noise import joined, relative_noise
 from luxcore.render.oidn import Denoiser, keep_energy
 from luxcore.render.views import PanoramaView, View, view_from_json
@@ -142,9 +142,12 @@ def _clean(passes: Passes, denoiser: Denoiser, name: str, noisy: np.ndarray) -> 
         return Cleaned(noisy, 1.0, 0.0)
     emitting = np.rint(passes.index) % 10 == EMITTER_INDEX
     bright = passes.outside if name == AMBIENT_GROUP else emitting
+    # Two pixels: as far as the renderer's pixel filter reaches. Across the seam even where the view
+    # is no panorama: that leaves out a few pixels of the other border, and changes no mean.
+    rim = dilated(dilated(bright, wraps=True), wraps=True)
     denoised = denoiser(noisy)
-    image, energy = keep_energy(noisy, denoised, bright)
-    return Cleaned(image, energy, relative_noise(noisy, denoised, bright))
+    image, energy = keep_energy(noisy, denoised, bright, rim)
+    return Cleaned(image, energy, relative_noise(noisy, denoised, rim))
 
 
 def _masks(passes: Passes, room: Room, view: View) -> dict[str, np.ndarray]:
