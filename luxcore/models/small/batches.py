@@ -11,6 +11,7 @@ from numpy.random import PCG64, Generator, SeedSequence
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
+from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
@@ -23,8 +24,8 @@ from luxcore.models.small.samples import CropPool
 class SingleBatches:
     """Single photos of `pool`, newly lit each time, half of them mirrored.
 
-    `geometry` is the share of photos that come with true depth and normals; for the rest
-    `estimator` guesses them, where there is one.
+    `repaint` is the share of photos whose surfaces get other colours, `geometry` the share that
+    comes with true depth and normals; for the rest `estimator` guesses them, where there is one.
     """
 
     pool: CropPool
@@ -32,6 +33,7 @@ class SingleBatches:
     photos: int = 5
     geometry: float = 0.5
     estimator: UNet | None = None
+    repaint: float = 0.6
 
     def batch(self, step: int) -> list[tuple[Tensor, Example]]:
         """`photos` examples with the features of their lamps; photos that show no lamp are passed
@@ -39,8 +41,9 @@ class SingleBatches:
         rng = Generator(PCG64(SeedSequence((self.seed, step))))
         found: list[tuple[Tensor, Example]] = []
         while len(found) < self.photos:
+            (crop,) = self.pool.relit(rng, 1)
             example = to_example(
-                self.pool.relit(rng, 1)[0],
+                repainted(crop, rng) if rng.random() < self.repaint else crop,
                 geometry=bool(rng.random() < self.geometry),
                 flip=bool(rng.random() < 0.5),
             )
