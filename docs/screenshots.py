@@ -9,6 +9,7 @@ import argparse
 import json
 import urllib.parse
 import urllib.request
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,18 +28,29 @@ GOTO_MS = 180_000
 OFFLINE = ["--no-sandbox", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
 """Pages that ask for anything elsewhere are told at once that there is nothing."""
 ARGUMENTS = [*OFFLINE, "--use-gl=angle", "--use-angle=swiftshader"]
+WIDE = (1400, 860)
+CLOSE_CHAT = '[data-component-id="mlflow.assistant.chat_panel.close"]'
 EVENING = "split=40&l1=0,0,o"
 """The first lamp off, the photo on the left."""
 
 
 def shoot(
-    browser: Browser | BrowserContext, address: str, out: Path, size: tuple[int, int], wait_ms: int
+    browser: Browser | BrowserContext,
+    address: str,
+    out: Path,
+    size: tuple[int, int],
+    wait_ms: int,
+    click: Sequence[str] = (),
 ) -> None:
-    """One page as a picture."""
+    """One page as a picture, after clicks on what the selectors `click` find first, if anything."""
     page = browser.new_page()
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.goto(address, timeout=GOTO_MS)
     page.wait_for_timeout(wait_ms)
+    for selector in click:
+        if page.locator(selector).count():
+            page.locator(selector).first.click()
+            page.wait_for_timeout(wait_ms // 2)
     page.screenshot(path=str(out), type="jpeg", quality=QUALITY, timeout=GOTO_MS)
     page.close()
     print(out)
@@ -53,21 +65,28 @@ def ask(address: str, body: dict[str, Any]) -> Any:
         return json.load(answer)
 
 
-def shoot_mlflow(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
-    """The table of runs; curves, pictures and use of the machine of the newest stage 1."""
+def newest_run(address: str, stage: str) -> str:
+    """The address of the newest run of a stage in mlflow."""
     search = f"{address}/api/2.0/mlflow/runs/search"
-    found = ask(search, {"experiment_ids": ["1"], "filter": "tags.stage = 'splat'"})
-    run = f"{address}/#/experiments/1/runs/{found['runs'][0]['info']['run_id']}"
-    pages = {
-        "runs": f"{address}/#/experiments/1/runs",
-        "run": run,
-        "curves": f"{run}/model-metrics",
-        "system": f"{run}/system-metrics",
-        "pictures": f"{run}/artifacts",
+    found = ask(search, {"experiment_ids": ["1"], "filter": f"tags.stage = '{stage}'"})
+    return f"{address}/#/experiments/1/runs/{found['runs'][0]['info']['run_id']}"
+
+
+def shoot_mlflow(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
+    """The table of runs; curves and use of the machine of stage 1; a stage's pictures."""
+    splat, trained = newest_run(address, "splat"), newest_run(address, "train_sv")
+    # The row of a flow opens to the runs of its stages.
+    opened = '[data-component-id$="cells_runnamecellrenderer.tsx_46"]'
+    pages: dict[str, tuple[str, tuple[str, ...]]] = {
+        "runs": (f"{address}/#/experiments/1/runs", (opened,)),
+        "run": (splat, ()),
+        "curves": (f"{splat}/model-metrics", ()),
+        "system": (f"{splat}/system-metrics", ()),
+        "pictures": (f"{trained}/artifacts", ('text="pictures"', 'text="validation.png"')),
     }
     context = browser.new_context()
-    for name, page in pages.items():
-        shoot(context, page, out / f"mlflow_{name}.jpg", (1400, 860), wait_ms)
+    for name, (page, clicks) in pages.items():
+        shoot(context, page, out / f"mlflow_{name}.jpg", WIDE, wait_ms, (CLOSE_CHAT, *clicks))
 
 
 def shoot_prefect(browser: Browser, address: str, out: Path, wait_ms: int) -> None:
@@ -79,10 +98,10 @@ def shoot_prefect(browser: Browser, address: str, out: Path, wait_ms: int) -> No
         "limit": 1,
     }
     run = f"{address}/runs/flow-run/{ask(f'{address}/api/flow_runs/filter', query)[0]['id']}"
-    pages = {"flow": run, "artifacts": f"{run}?tab=Artifacts", "runs": f"{address}/runs"}
     context = browser.new_context()
-    for name, page in pages.items():
-        shoot(context, page, out / f"prefect_{name}.jpg", (1400, 860), wait_ms)
+    shoot(context, run, out / "prefect_flow.jpg", WIDE, wait_ms)
+    shoot(context, run, out / "prefect_artifacts.jpg", WIDE, wait_ms, ("#artifacts",))
+    shoot(context, f"{address}/runs", out / "prefect_runs.jpg", WIDE, wait_ms)
 
 
 def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:

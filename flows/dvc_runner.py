@@ -12,9 +12,12 @@ import time
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from luxcore.errors import LuxError
 from luxcore.lifetime import die_with_parent
 
+NEVER_RUN = "it has not run here yet"
 BUSY_RETRY_S = 2.0
 BUSY = "is busy"
 """DVC's word for a stage that is running elsewhere; `--wait-for-lock` does not cover it."""
@@ -34,12 +37,25 @@ def stale_stages(root: Path) -> dict[str, list[str]]:
     if done.returncode != 0:
         raise LuxError(f"dvc status failed: {_last_line(done.stderr)}")
     status = json.loads(done.stdout or "{}")
-    return {name: reason_phrases(entries) for name, entries in status.items()}
+    return {name: stale_reasons(root, name, entries) for name, entries in status.items()}
 
 
-def reason_phrases(entries: list[Any]) -> list[str]:
-    """DVC's status of one stage (nested names and states) as phrases for people."""
+def stale_reasons(root: Path, name: str, entries: list[Any]) -> list[str]:
+    """DVC's status of one stage (nested names and states) as phrases for people.
+
+    To DVC everything is modified about a stage that it does not know; to people it is new.
+    """
+    if entries and name not in _locked_stages(root):
+        return [NEVER_RUN]
     return [phrase for entry in entries for phrase in _entry_phrases(entry)]
+
+
+def _locked_stages(root: Path) -> set[str]:
+    """Stages that `dvc.lock` has a result of."""
+    lock = root / "dvc.lock"
+    if not lock.is_file():
+        return set()
+    return set((yaml.safe_load(lock.read_text()) or {}).get("stages", {}))
 
 
 def reproduce(root: Path, stage: str) -> str:

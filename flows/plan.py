@@ -54,7 +54,7 @@ def totals(plans: list[StagePlan]) -> tuple[int, float, bool]:
 
 
 def _plan_stage(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> StagePlan:
-    state, why = _state(repo, stage, upstream)
+    state, why = _state(root, repo, stage, upstream)
     missing, total = (None, None) if state in ("fresh", "cached") else _units(root, stage.name)
     seconds = 0.0 if state in ("fresh", "cached") else _last_seconds(root, stage.name)
     if seconds and missing is not None and total:
@@ -62,17 +62,17 @@ def _plan_stage(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> Sta
     return StagePlan(stage.name, state, why, missing, total, seconds, _megabytes(root, stage))
 
 
-def _state(repo: Any, stage: Stage, upstream: list[str]) -> tuple[str, str]:
+def _state(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> tuple[str, str]:
     from dvc.stage.cache import RunCacheNotFoundError
 
-    from flows.dvc_runner import reason_phrases
+    from flows.dvc_runner import stale_reasons
 
     entry = repo.stage.load_one(name=stage.name)
     if upstream:
         return "waiting", f"{', '.join(upstream)} will change"
     with repo.lock:
         status = entry.status(check_updates=False)
-    reasons = reason_phrases(status.get(entry.addressing, []))
+    reasons = stale_reasons(root, stage.name, status.get(entry.addressing, []))
     if not reasons:
         return "fresh", ""
     try:

@@ -44,7 +44,10 @@ def log_stage(
         tags=_tags(context, does),
     )
     run_id = run.info.run_id
-    values = {**context.metrics, "wall_s": seconds, "peak_memory_mb": peak_mb}
+    # The last point of a curve is its final value: given again, it would be drawn as a first point.
+    curves = {name for name, _, _ in context.series}
+    values = {name: value for name, value in context.metrics.items() if name not in curves}
+    values |= {"wall_s": seconds, "peak_memory_mb": peak_mb}
     metrics = [Metric(name, value, now, 0) for name, value in values.items()]
     metrics += [Metric(name, value, now, step) for name, value, step in context.series]
     for step, sample in enumerate(samples):

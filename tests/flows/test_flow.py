@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.dvc_runner import environment, reproduce, stale_stages
+from flows.dvc_runner import NEVER_RUN, environment, reproduce, stale_stages
 from luxcore.errors import LuxError
 from tests.flows.toy import TOY_STAGES, dvc_repro, make_project, runs, set_seed
 
@@ -51,6 +51,7 @@ def test_a_failing_stage_is_one_sentence_and_upstream_is_kept(tmp_path, run_flow
 
 def test_reasons_and_outcomes_are_said_and_the_lock_is_copied_first(tmp_path):
     root = make_project(tmp_path / "p")
+    assert stale_stages(root)["rooms"] == [NEVER_RUN]
     assert reproduce(root, "rooms") == "ran"
     before = (root / "dvc.lock").read_bytes()
     assert "rooms" not in stale_stages(root)
