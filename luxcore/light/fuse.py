@@ -1,4 +1,8 @@
-"""The fuse stage for one capture: every view's exposures of every light, merged to linear HDR."""
+"""The fuse stage for one capture: linear HDR light of every view.
+
+Taken from the model where it gives linear light, which is as exact as merging its exposures; these
+are then merged in some views only, to be compared. Or merged in all views, as the paper does.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +43,8 @@ def fuse_capture(
     """Write `NNNN.exr` (ambient, light_00, …, float32) of every view and `fuse.json` into `out`.
 
     Returns flat metrics: shares of pixels that were clipped, black, unknown or contradictory in the
-    exposures, and the median relative difference to the model's own linear light. Raises InputError
-    or FormatError naming a missing or unfit file.
+    exposures that were merged, and the median relative difference to the model's own linear light.
+    Raises InputError or FormatError naming a missing or unfit file.
     """
     exposure = capture.exposure or 1.0
     units = [
@@ -61,26 +65,28 @@ def fuse_capture(
 
 
 def fuse_view(
-    out_dir: Path, *, harmonize_dir: str, view: int, exposure: float, method: Method
+    out_dir: Path, *, harmonize_dir: str, view: int, exposure: float, method: Method, merge: bool
 ) -> None:
-    """One view as a unit of work: `fused.exr` and `counts.json`."""
+    """One view as a unit of work: `fused.exr` and `counts.json`; `merge`: its exposures too."""
     root = Path(harmonize_dir)
-    direct = _direct(root, view)
-    counts = dict.fromkeys(_COUNTS, 0)
+    counts = dict.fromkeys((*_COUNTS, "pixels"), 0)
     difference: list[float] = []
     layers: dict[str, np.ndarray] = {}
-    for name, linear in direct.items():
+    for name, linear in _direct(root, view).items():
+        if not merge:
+            layers[name] = np.maximum(linear, 0.0)
+            continue
         merged = merge_files(_bracket_paths(root, view, name), exposure)
         if merged.radiance.shape != linear.shape:
             raise FormatError(f"{root}: view {view}'s exposures and linear light differ in size.")
         for count in _COUNTS:
             counts[count] += getattr(merged, count)
+        counts["pixels"] += linear[..., 0].size
         difference.append(median_difference(merged.radiance, linear, exposure))
         layers[name] = np.maximum(_chosen(method, merged.radiance, linear), 0.0)
     write_exr(out_dir / "fused.exr", layers, half=False)
-    pixels = sum(layer[..., 0].size for layer in layers.values())
     beyond_half = sum(int((layer > HALF_MAX).sum()) for layer in layers.values())
-    record = {**counts, "pixels": pixels, "beyond_half": beyond_half, "difference": difference}
+    record = {**counts, "beyond_half": beyond_half, "difference": difference}
     write_json(out_dir / "counts.json", record)
 
 
@@ -114,10 +120,17 @@ def median_difference(
 
 def _unit(root: Path, capture_id: str, view: int, exposure: float, settings: FuseSettings) -> Unit:
     files = [root / "direct" / f"{view:04d}.exr"]
-    files += sorted((root / "brackets").glob(f"{view:04d}_*.png"))
+    merge = settings.method == "debevec" or view % settings.merge_every == 0
+    if merge:
+        files += sorted((root / "brackets").glob(f"{view:04d}_*.png"))
     if not files[0].is_file():
         raise InputError(f"{files[0]} does not exist.")
-    about: dict[str, Any] = {"exposure": exposure, "method": settings.method, "view": view}
+    about: dict[str, Any] = {
+        "exposure": exposure,
+        "method": settings.method,
+        "view": view,
+        "merge": merge,
+    }
     names = [f.name for f in files]
     key = unit_key(CODE, {**about, "files": names}, [file_digest(f) for f in files])
     arguments = {"harmonize_dir": str(root), **about}

@@ -15,7 +15,13 @@ class FuseSettings(Settings):
     """How each lamp's exposures become linear light."""
 
     method: Method = Field(
-        "debevec",
-        description="debevec: merge the three 8-bit exposures of each light, as the paper does; "
-        "direct: take the linear light of a model that gives it",
+        "direct",
+        description="direct: take the model's own linear light; debevec: merge the three 8-bit "
+        "exposures of each light, as the paper does",
+    )
+    merge_every: int = Field(
+        6,
+        ge=1,
+        description="with direct: every so many views the exposures are merged as well, and the "
+        "difference reported",
     )

@@ -41,6 +41,9 @@ def capture(tmp_path: Path) -> Capture:
     )
 
 
+MERGED = FuseSettings(method="debevec")
+
+
 @pytest.fixture
 def harmonize_dir(tmp_path: Path) -> Path:
     root = tmp_path / "harmonize"
@@ -57,7 +60,7 @@ def harmonize_dir(tmp_path: Path) -> Path:
 
 def test_light_beyond_one_exposure_is_recovered(tmp_path, capture, harmonize_dir):
     store = UnitStore(tmp_path / "units")
-    metrics = fuse_capture(harmonize_dir, capture, tmp_path / "out", FuseSettings(), store)
+    metrics = fuse_capture(harmonize_dir, capture, tmp_path / "out", MERGED, store)
     layers = read_exr(tmp_path / "out" / "0001.exr")
     assert sorted(layers) == ["ambient", "light_00"]
     # EV 0 alone is white here: AgX ends at 16.3 and g·I reaches 45.
@@ -69,20 +72,25 @@ def test_light_beyond_one_exposure_is_recovered(tmp_path, capture, harmonize_dir
     assert about["exposure"] == G
 
 
-def test_direct_takes_the_models_light_and_still_counts(tmp_path, capture, harmonize_dir):
-    store = UnitStore(tmp_path / "units")
-    settings = FuseSettings(method="direct")
-    metrics = fuse_capture(harmonize_dir, capture, tmp_path / "out", settings, store)
-    layers = read_exr(tmp_path / "out" / "0000.exr")
-    assert np.array_equal(layers["light_00"], light(5, 90.0))
-    assert metrics["median_difference_to_direct"] > 0
+def test_direct_takes_the_models_light_and_merges_some_views(tmp_path, capture, harmonize_dir):
+    # The second view is not to be merged: its exposures are not missed.
+    for file in (harmonize_dir / "brackets").glob("0001_*"):
+        file.unlink()
+    metrics = fuse_capture(
+        harmonize_dir, capture, tmp_path / "out", FuseSettings(), UnitStore(tmp_path / "units")
+    )
+    for view in (0, 1):
+        layers = read_exr(tmp_path / "out" / f"{view:04d}.exr")
+        assert np.array_equal(layers["light_00"], light(view + 5, 90.0))
+    assert 0 < metrics["median_difference_to_direct"] < 0.02
+    assert json.loads((tmp_path / "out" / "fuse.json").read_text())["method"] == "direct"
 
 
 def test_finished_views_are_not_fused_again(tmp_path, capture, harmonize_dir):
     store = UnitStore(tmp_path / "units")
-    fuse_capture(harmonize_dir, capture, tmp_path / "a", FuseSettings(), store)
+    fuse_capture(harmonize_dir, capture, tmp_path / "a", MERGED, store)
     stamps = {p: p.stat().st_mtime_ns for p in store.root.rglob("fused.exr")}
-    fuse_capture(harmonize_dir, capture, tmp_path / "b", FuseSettings(), store)
+    fuse_capture(harmonize_dir, capture, tmp_path / "b", MERGED, store)
     assert stamps == {p: p.stat().st_mtime_ns for p in store.root.rglob("fused.exr")}
     assert (tmp_path / "a/0000.exr").read_bytes() == (tmp_path / "b/0000.exr").read_bytes()
 
@@ -92,8 +100,8 @@ def test_missing_files_are_named(tmp_path, capture, harmonize_dir):
     for file in (harmonize_dir / "brackets").glob("0001_00_*"):
         file.unlink()
     with pytest.raises(LuxError, match="no exposures of light_00 in view 1"):
-        fuse_capture(harmonize_dir, capture, tmp_path / "out", FuseSettings(), store)
+        fuse_capture(harmonize_dir, capture, tmp_path / "out", MERGED, store)
     assert not (tmp_path / "out" / "fuse.json").exists()
     (harmonize_dir / "direct" / "0000.exr").unlink()
     with pytest.raises(InputError, match=r"0000\.exr does not exist"):
-        fuse_capture(harmonize_dir, capture, tmp_path / "out", FuseSettings(), store)
+        fuse_capture(harmonize_dir, capture, tmp_path / "out", MERGED, store)

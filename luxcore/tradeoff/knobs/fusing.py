@@ -1,4 +1,4 @@
-"""The three exposures of each light merged as in the paper, or the model's own linear light."""
+"""The model's own linear light, or the three exposures of each light merged as in the paper."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ METHOD = Knob(
     ),
     error=ERROR,
     why="Equal errors at a small part of the time: merging is what the paper's display-referred "
-    "models need, and `fuse.method: direct` leaves it out for one that gives linear light.",
+    "models need, and a model that gives linear light does without.",
     prepare=_prepare,
     run=_run,
 )
