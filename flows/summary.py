@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 from flows.plan import StagePlan
-from luxcore.evaluate.table import headlines
+from luxcore.evaluate.answers import answers
 
 
 def plan_table(plans: list[StagePlan]) -> str:
@@ -27,12 +27,20 @@ def plan_table(plans: list[StagePlan]) -> str:
 
 
 def metrics_table(root: Path) -> str:
-    """The evaluation's headline metrics, one row each; the report has the whole tables."""
+    """The scores that people ask for first; the report has the whole tables."""
     path = root / "artifacts" / "metrics" / "evaluate.json"
     if not path.is_file():
         return "no evaluation yet."
-    metrics = headlines(json.loads(path.read_text()))
-    return _table(["metric", "value"], [[name, f"{value:.4g}"] for name, value in metrics.items()])
+    rows = [
+        [
+            a.what,
+            f"{a.value:.2f}",
+            "" if a.beside_value is None else f"{a.beside_value:.2f}",
+            a.beside,
+        ]
+        for a in answers(json.loads(path.read_text()))
+    ]
+    return _table(["PSNR of", "this run, dB", "beside it, dB", "which is"], rows)
 
 
 def _table(columns: list[str], rows: list[list[str]]) -> str:

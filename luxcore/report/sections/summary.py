@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from luxcore.evaluate.table import headlines
+from luxcore.evaluate.answers import answers
 from luxcore.report.content import Section, Strip, Table, number
 from luxcore.report.gallery import Gallery
 from luxcore.report.sources import read_json
@@ -15,9 +15,19 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     """Headline metrics and the time and memory of every stage."""
     blocks: list[Strip | Table] = []
     metrics = read_json(artifacts / "evaluate" / "metrics.json") or {}
-    if metrics:
-        rows = tuple((name, number(value)) for name, value in sorted(headlines(metrics).items()))
-        blocks.append(Table("Scores", "evaluate", ("score", "value"), rows))
+    if found := answers(metrics):
+        rows = tuple(
+            (
+                a.what,
+                number(a.value),
+                "" if a.beside_value is None else number(a.beside_value),
+                a.beside,
+            )
+            for a in found
+        )
+        heads = ("what", "this run, dB", "beside it, dB", "which is")
+        note = "PSNR on AgX pictures, light scaled channel by channel; all scores are under Tables."
+        blocks.append(Table("How close to the truth", "evaluate", heads, rows, note=note))
     timings = {
         path.stem: read_json(path) for path in sorted((artifacts / "timings").glob("*.json"))
     }
