@@ -40,6 +40,6 @@ def relit_capture(
         views(),
         Points(baked.means, colors),
         source="rendered",
-        metric=True,
+        metric=scene.metric,
         exposure=scene.tone.exposure,
     )

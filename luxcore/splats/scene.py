@@ -61,6 +61,8 @@ class Scene:
     ambient_scale: tuple[float, float, float]
     tone: SceneTone
     views: int
+    metric: bool = False
+    """Whether a unit of the world is known to be a metre."""
 
 
 def save_scene(
@@ -88,6 +90,7 @@ def save_scene(
         "ambient_scale": list(scene.ambient_scale),
         "tone": asdict(scene.tone),
         "views": scene.views,
+        "metric": scene.metric,
         "digests": {name: file_digest(folder / name) for name in FILES},
     }
     write_json(folder / "scene.json", about)
@@ -112,6 +115,7 @@ def load_scene(folder: Path) -> Scene:
             ambient_scale=_three(about["ambient_scale"]),
             tone=SceneTone(**{key: float(value) for key, value in about["tone"].items()}),
             views=int(about["views"]),
+            metric=bool(about.get("metric", False)),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(f"{folder / 'scene.json'} lacks a usable {error}.") from error

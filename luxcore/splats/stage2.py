@@ -181,6 +181,7 @@ def _scene(fit: LightFit, capture: Capture, lamps: Sequence[Lamp]) -> Scene:
         ambient_scale=_three(weights[0]),
         tone=SceneTone(fit.exposure, curve.beta, curve.gamma),
         views=len(capture.frames),
+        metric=capture.metric,
     )
     return replace(scene, gaussians=baked_gaussians(scene))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -62,6 +63,8 @@ def test_scene_round_trip_is_lossless(scene: Scene, folder: Path) -> None:
     assert (read.lamps, read.tone, read.ambient_scale) == (
         scene.lamps, scene.tone, scene.ambient_scale,
     )  # fmt: skip
+    save_scene(folder, replace(scene, metric=True), [CAMERA, CAMERA])
+    assert (read.metric, load_scene(folder).metric) == (False, True)
 
 
 def test_damage_version_and_mismatch_are_refused(folder: Path) -> None:
