@@ -160,8 +160,8 @@ SOLVER = Knob(
         *(Choice(f"{SQUARES} {n}", {}) for n in (1, 2, 4, 8)),
     ),
     error="RMS error of single lamps in held-out views, display 0..1",
-    why="Least squares settles in a few passes over all views but knows nothing of smoothness, "
-    "structure or the tone curve, and what views do not see it lets run away.",
+    why="Least squares errs more from its first pass on, and further passes fit what the views "
+    "disagree about: held-out views get worse. Gradient steps do not, and 38 of them would do here.",
     prepare=freeze,
     run=_run,
     fixed_default=f"{GRADIENT} {DEFAULT}",

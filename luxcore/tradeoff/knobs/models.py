@@ -134,8 +134,8 @@ VIEWS_PER_PASS = Knob(
     work="light carried to all views",
     choices=tuple(Choice(str(n), {"harmonize.views_per_pass": n}) for n in (4, 8, 15)),
     error=ERROR,
-    why="More views in one pass agree better and share the references' cost; 15 is the most that "
-    "the paper's memory holds.",
+    why="Every pass reads its references anew, so few large passes cost least; 15 is the most that "
+    "the paper's memory holds. Smaller ones err one per cent less.",
     prepare=_prepare,
     run=_harmonize,
 )
@@ -145,8 +145,8 @@ REFERENCES = Knob(
     work="light carried to all views",
     choices=tuple(Choice(str(n), {"decompose.references_per_lamp": n}) for n in (1, 2, 3)),
     error=ERROR,
-    why="A second reference must be taken apart, carried along in every pass and disagrees with "
-    "the first; one is the paper's choice.",
+    why="One is the paper's choice and the cheapest: two more take a quarter more time and lower "
+    "the error by one per cent.",
     prepare=_prepare,
     run=_harmonize,
 )

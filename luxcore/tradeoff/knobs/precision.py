@@ -66,7 +66,7 @@ PRECISION = Knob(
     choices=(Choice("float", {}), Choice("half", {})),
     error="RMS difference to float, single lamps, display 0..1",
     why="Half takes a quarter of the cache's memory away at an error nobody sees, but a CPU widens "
-    "every weight again; float is kept for its equal bits with the rasterizer.",
+    "every weight again and takes a quarter longer; float has equal bits with the rasterizer too.",
     prepare=_prepare,
     run=_run,
     fixed_default="float",
