@@ -161,7 +161,7 @@ SOLVER = Knob(
     ),
     error="RMS error of single lamps in held-out views, display 0..1",
     why="Least squares errs more from its first pass on, and further passes fit what the views "
-    "disagree about: held-out views get worse. Gradient steps do not, and 38 of them would do here.",
+    "disagree about: held-out views get worse. Gradient steps do not; 38 of them would do here.",
     prepare=freeze,
     run=_run,
     fixed_default=f"{GRADIENT} {DEFAULT}",
