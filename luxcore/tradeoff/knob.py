@@ -11,7 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from luxcore.errors import InputError
+from luxcore.rooms import Room
+from luxcore.rooms.batch import demo_room
 from luxcore.settings.project import ProjectSettings
+
+DEMO = "demo"
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,12 @@ class Bench:
         if not folder.is_dir():
             raise InputError(f"{folder} does not exist: run the flow first (`lux run`).")
         return folder
+
+    def demo_room(self) -> Room:
+        """The room that renders are measured on. Raises InputError for any other capture."""
+        if self.capture != DEMO:
+            raise InputError(f"renders are measured on the room of capture {DEMO} only.")
+        return demo_room(self.params.rooms)
 
 
 @dataclass(frozen=True)

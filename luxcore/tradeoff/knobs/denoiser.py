@@ -11,7 +11,6 @@ from luxcore.files.exr import read_exr
 from luxcore.render.oidn import Denoiser
 from luxcore.render.unit import render_unit, view_job
 from luxcore.render.views import PanoramaView
-from luxcore.rooms.batch import demo_room
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
@@ -30,7 +29,7 @@ class _Prepared:
 
 
 def _prepare(bench: Bench) -> _Prepared:
-    room = demo_room(bench.params.rooms)
+    room = bench.demo_room()
     settings = bench.params.render.model_copy(update={"denoise": "off"})
     scales = {"ambient": np.ones(3, np.float32)}
     for index, lamp in enumerate(room.lamps):

@@ -33,8 +33,9 @@ class _Prepared:
 
 
 def _prepare(bench: Bench) -> _Prepared:
+    room = bench.demo_room()
     truth = true_lights(bench.params.rooms, bench.params.render)
-    return _Prepared(demo_room(bench.params.rooms), bench.scratch, bench.params.render, truth)
+    return _Prepared(room, bench.scratch, bench.params.render, truth)
 
 
 _TRUTH: dict[str, dict[str, np.ndarray]] = {}
