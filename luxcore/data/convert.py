@@ -8,11 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.cameras import Camera, camera_to_nerfstudio
-from luxcore.data.compact import load_rendered, read_metadata, save_rendered
+from luxcore.data.compact import (
+    holds_compact,
+    list_rendered,
+    load_rendered,
+    read_metadata,
+    save_rendered,
+)
 from luxcore.data.crops import LitCrop
-from luxcore.data.public_reader import open_scenes
+from luxcore.data.multiview import MultiViewSets
+from luxcore.data.public_reader import open_scenes, public_views
 from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
 from luxcore.data.rotations import quaternion_from_matrix
+from luxcore.data.store import AnyView, ViewStore
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder, write_json
 from luxcore.files.exr import write_exr
@@ -49,6 +57,29 @@ def public_to_compact(path: Path, out: Path) -> list[Path]:
             stems.append(Path(out) / f"{scene.scene_id}_{view}")
             save_rendered(scene.read_view(view, mix), stems[-1])
     return stems
+
+
+def cut_photos(
+    source: Path, out: Path, *, photos: int, size: tuple[int, int], seed: int = 0
+) -> list[Path]:
+    """`photos` overlapping perspective photos of every room of `source` as `out`/ROOM.
+
+    `source`: views in either form; `size` is (height, width). See `export_photos`.
+    """
+    views: Sequence[AnyView] = (
+        list_rendered(source) if holds_compact(source) else public_views(source)
+    )
+    store = ViewStore(views)
+    rooms: dict[str, list[AnyView]] = {}
+    for number, view in enumerate(views):
+        rooms.setdefault(store.room(number), []).append(view)
+    folders = []
+    with progress("photos", len(rooms), "rooms") as bar:
+        for room, members in rooms.items():
+            sets = MultiViewSets(members, size, seed, relit=False, mask_kinds=("fixture",))
+            folders.append(export_photos(sets.crops(0, photos), Path(out) / room))
+            bar.advance()
+    return folders
 
 
 def export_photos(crops: Sequence[LitCrop], out: Path) -> Path:

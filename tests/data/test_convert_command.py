@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pycolmap
 import pytest
 from click.testing import CliRunner
 
@@ -13,6 +15,7 @@ from luxcore.cli.convert import command
 from luxcore.data.compact import as_taken, list_rendered, load_rendered, save_rendered
 from luxcore.data.public_reader import open_scenes
 from luxcore.errors import InputError
+from luxcore.files.photos import read_photo
 from tests.data.analytic import panorama
 
 PLACES = ((2.0, 2.2, 1.5), (3.0, 1.2, 1.4), (4.5, 3.0, 1.6))
@@ -56,6 +59,24 @@ def test_there_and_back_through_shards(views: Path, tmp_path: Path) -> None:
         assert (second.on == first.on).all()
         assert np.array_equal(second.masks["emitter"], first.masks["emitter"])
     assert sorted(p.name for p in public.iterdir()) == ["training-0000.tar", "training-0001.tar"]
+
+
+def test_rooms_become_photos_with_cameras_from_either_form(views: Path, tmp_path: Path) -> None:
+    convert(views, "--out", tmp_path / "public")
+    for form, rooms in (
+        (views, ["box", "other"]),
+        (tmp_path / "public", ["000000", "000001"]),
+    ):
+        out = tmp_path / f"photos of {form.name}"
+        convert(form, "--out", out, "--photos", "3", "--photo-size", "24")
+        assert sorted(p.name for p in out.iterdir()) == rooms
+        for folder in out.iterdir():
+            frames = json.loads((folder / "transforms.json").read_text())["frames"]
+            assert [frame["file_path"] for frame in frames] == [
+                f"images/000{i}.png" for i in range(3)
+            ]
+            assert read_photo(folder / "images" / "0002.png").shape == (24, 24, 3)
+            assert len(pycolmap.Reconstruction(folder / "sparse" / "0").images) == 3
 
 
 def test_a_folder_of_neither_form_is_an_error(tmp_path: Path) -> None:
