@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import multiprocessing
 import os
+import signal
 import subprocess
 from pathlib import Path
 
@@ -44,26 +47,46 @@ def serve(
             print(f"{name}: runs at {cron!r} in {place}; pages at {pages}", flush=True)
             given = {"root": str(root), "worktree": str(place)}
             parameters = {**given, "targets": targets, "changes": changes}
+            signal.signal(signal.SIGINT, _stop_at_once)
             try:
                 scheduled_run.serve(
                     name, cron=cron, parameters=parameters, print_starting_message=False
                 )
+            except asyncio.CancelledError:
+                print(f"{name}: the schedule was stopped.", flush=True)
             finally:
                 _end_runs(root)
     except BusyError as error:
         raise LuxError(f"{name} is on a schedule already: {error}") from error
 
 
+def _stop_at_once(number: int, frame: object) -> None:
+    """Ctrl-C: Prefect would wait for the run to finish, so the run goes first."""
+    _kill_children()
+    try:
+        loop = asyncio.get_running_loop()
+    except RuntimeError:
+        raise KeyboardInterrupt from None
+    # Connections that end in the middle are no news now.
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)
+    # An exception raised here would hit whatever Prefect is doing, and could be swallowed.
+    for work in asyncio.all_tasks(loop):
+        loop.call_soon_threadsafe(work.cancel)
+
+
 def _end_runs(root: Path) -> None:
     """A schedule that is stopped takes its run along while the server still listens.
 
-    Prefect would wait for it to finish. Units that are done are kept for the next run.
+    Units that are done are kept for the next run.
     """
-    children = multiprocessing.active_children()
-    for child in children:
+    _kill_children()
+    bury_dead_runs(prefect_home(root))
+
+
+def _kill_children() -> None:
+    for child in multiprocessing.active_children():
         child.kill()
         child.join()
-    bury_dead_runs(prefect_home(root))
 
 
 def default_worktree(root: Path) -> Path:
