@@ -68,7 +68,12 @@ def resized(image: Float32[np.ndarray, "h w c"], camera: Camera) -> Float32[np.n
     import cv2
 
     size = (camera.width, camera.height)
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA).reshape(*size[::-1], -1)
+    # By three channels, as OpenCV averages at most four unless sides divide evenly.
+    parts = [
+        cv2.resize(image[..., k : k + 3], size, interpolation=cv2.INTER_AREA)
+        for k in range(0, image.shape[2], 3)
+    ]
+    return np.concatenate([part.reshape(*size[::-1], -1) for part in parts], axis=2)
 
 
 @dataclass(frozen=True)

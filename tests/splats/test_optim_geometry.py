@@ -13,7 +13,7 @@ from luxcore.splats.geometry import camera_points, expected_depth, normals_from_
 from luxcore.splats.harmonics_choice import choose_degree
 from luxcore.splats.initial import initial_gaussians, random_points, scene_extent
 from luxcore.splats.morton import morton_order
-from luxcore.splats.views import split_views, view_at
+from luxcore.splats.views import resized, split_views, view_at
 
 CAMERA = look_at(np.array([0.5, -3.0, 1.2]), np.array([0.2, 0.0, 0.9]), 70.0, 64, 48)
 
@@ -115,3 +115,13 @@ def test_points_of_a_real_capture(shared_data: Path) -> None:
     gaussians = initial_gaussians(xyz, rgb, extent, 20_000, np.random.default_rng(0))
     assert len(gaussians) == 20_000
     assert np.isfinite(gaussians.log_scales).all()
+
+
+def test_light_images_of_any_number_of_lamps_are_averaged_to_any_size() -> None:
+    rng = np.random.Generator(np.random.PCG64(0))
+    image = rng.random((31, 47, 12), np.float32)
+    camera = look_at(np.array([0.0, -1.0, 0.5]), np.zeros(3), 60.0, 29, 19)
+    small = resized(image, camera)
+    assert small.shape == (19, 29, 12)
+    assert small.mean(axis=(0, 1)) == pytest.approx(image.mean(axis=(0, 1)), abs=0.01)
+    np.testing.assert_array_equal(small[..., 3:6], resized(image[..., 3:6], camera))
