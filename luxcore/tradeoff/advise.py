@@ -85,6 +85,16 @@ class Advice:
         return sum(expected.seconds for expected in self.works)
 
     @property
+    def agrees(self) -> bool:
+        """Whether no two choices want different values of one setting."""
+        wanted: dict[str, Any] = {}
+        for point in self.chosen.values():
+            if any(wanted.get(path, value) != value for path, value in point.settings.items()):
+                return False
+            wanted |= point.settings
+        return True
+
+    @property
     def settings(self) -> dict[str, Any]:
         """Dotted paths into params.yaml."""
         return {k: v for expected in self.works for k, v in expected.settings.items()}
@@ -112,7 +122,7 @@ def within_budget(sweeps: Sequence[Sweep], budget_s: float) -> Advice:
     """
     turned = _turned(sweeps)
     fronts = {sweep.knob: front(sweep.points) for sweep in turned}
-    advice = Advice(turned, {knob: points[0] for knob, points in fronts.items()})
+    advice = with_quality(sweeps, "low")
     if advice.seconds > budget_s:
         raise InputError(
             f"a budget of {budget_s:.0f} s is too small: the least is {advice.seconds:.1f} s."
@@ -123,13 +133,22 @@ def within_budget(sweeps: Sequence[Sweep], budget_s: float) -> Advice:
 
 
 def with_quality(sweeps: Sequence[Sweep], quality: Quality) -> Advice:
-    """The fastest, the default or the most accurate choice of every knob."""
-    turned, chosen = _turned(sweeps), {}
+    """The fastest, the default or the most accurate choice of every knob.
+
+    Where two knobs want different values of one setting, the second takes its next best.
+    """
+    turned = _turned(sweeps)
+    advice = Advice(turned, {sweep.knob: sweep.point(sweep.default) for sweep in turned})
+    if quality == "default":
+        return advice
     for sweep in turned:
         points = front(sweep.points)
-        end = points[0] if quality == "low" else points[-1]
-        chosen[sweep.knob] = sweep.point(sweep.default) if quality == "default" else end
-    return Advice(turned, chosen)
+        for point in points if quality == "low" else points[::-1]:
+            step = Advice(turned, {**advice.chosen, sweep.knob: point})
+            if step.agrees:
+                advice = step
+                break
+    return advice
 
 
 def try_out(advice: Advice, asked: str, knobs: Sequence[Knob], bench: Bench) -> Trial:
@@ -179,7 +198,7 @@ def _steps(
         if place + 1 < len(points):
             now, then = points[place], points[place + 1]
             step = Advice(advice.sweeps, {**advice.chosen, knob: then})
-            if step.seconds <= budget_s:
+            if step.agrees and step.seconds <= budget_s:
                 factor = math.log(max(now.error, _TINY) / max(then.error, _TINY))
                 steps.append((factor / max(step.seconds - advice.seconds, 1e-6), step))
     return steps

@@ -120,6 +120,22 @@ def test_knobs_of_one_work_are_expected_to_multiply() -> None:
     assert within_budget([KNEE, finer], 4.0).seconds <= 4.0
 
 
+def test_two_knobs_never_want_different_values_of_one_setting() -> None:
+    def passes(label: str, seconds: float, error: float, settings: dict[str, int]) -> Point:
+        return Point(label, settings, (Work(seconds, seconds, error),))
+
+    views = sweep("15", passes("15", 1.0, 0.2, {"views": 15}), passes("4", 2.0, 0.1, {"views": 4}))
+    references = sweep(
+        "1",
+        passes("1", 1.0, 0.2, {"references": 1}),
+        passes("3", 2.0, 0.1, {"references": 3, "views": 15}),
+        name="references",
+    )
+    high = with_quality([views, references], "high")
+    assert high.settings == {"views": 4, "references": 1}
+    assert within_budget([views, references], 100.0).agrees
+
+
 def test_what_params_yaml_does_not_have_is_not_advised() -> None:
     built_in = Point("x", {}, (Work(50.0, 50.0, 0.1),))
     advice = with_quality([KNEE, sweep("x", built_in, name="cut-off")], "high")

@@ -143,7 +143,14 @@ VIEWS_PER_PASS = Knob(
 REFERENCES = Knob(
     name="reference views of a lamp",
     work="light carried to all views",
-    choices=tuple(Choice(str(n), {"decompose.references_per_lamp": n}) for n in (1, 2, 3)),
+    # Several references of several lamps leave room for other views in a full pass only.
+    choices=(
+        Choice("1", {"decompose.references_per_lamp": 1}),
+        *(
+            Choice(str(n), {"decompose.references_per_lamp": n, "harmonize.views_per_pass": 15})
+            for n in (2, 3)
+        ),
+    ),
     error=ERROR,
     why="One is the paper's choice and the cheapest: two more take a quarter more time and lower "
     "the error by one per cent.",
