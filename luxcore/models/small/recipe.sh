@@ -25,7 +25,9 @@ train geometry geometry --base "$out/geometry64/model.safetensors" --rooms 100 -
 install_weights geometry geometry
 train sv sv --base "$out/sv64/model.safetensors" --rooms 230 --groups 900 --sketches 60 \
     --steps 900 --rate 1e-3
-install_weights sv sv
+train sv240 sv --base "$out/sv/model.safetensors" --rooms 240 --groups 1400 --sketches 40 \
+    --steps 2600 --rate 8e-4
+install_weights sv240 sv
 
 train mv mv --rooms 130 --groups 160 --sketches 40 --size 64 --photos 4 --steps 1000 --rate 1e-3
 install_weights mv mv
