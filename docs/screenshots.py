@@ -116,9 +116,9 @@ def shoot_viewer(browser: Browser, scene: Path, out: Path, port: int) -> None:
     page.wait_for_timeout(500)
     page.screenshot(path=str(out / "viewer.jpg"), type="jpeg", quality=QUALITY)
     page.get_by_role("checkbox").nth(2).uncheck()
-    page.get_by_text("Fast preview").wait_for()
+    # The preview between the two exact pictures may be gone before anyone asks for it.
+    page.wait_for_timeout(3000)
     page.get_by_text("Exact picture").wait_for(timeout=120_000)
-    page.wait_for_timeout(2000)
     page.screenshot(path=str(out / "viewer_lamp_off.jpg"), type="jpeg", quality=QUALITY)
     viewer.close()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from luxcore.data.compact import list_rendered
 from luxcore.evaluate.run import evaluate_models
 from luxcore.evaluate.scenes import SceneFolders, evaluate_scenes
+from luxcore.files.atomic import write_json
 from tasks.context import StageContext
 
 
@@ -23,8 +24,9 @@ def run(stage: StageContext) -> None:
         mv_weights=stage.input("train_mv") / "model.safetensors",
         seed=stage.seed,
     )
+    metrics |= evaluate_scenes(_scenes(stage), stage.out, stage.params.splat.holdout_every)
     stage.log_metrics(metrics)
-    stage.log_metrics(evaluate_scenes(_scenes(stage), stage.out, stage.params.splat.holdout_every))
+    write_json(stage.out / "metrics.json", metrics)
     for picture in sorted((stage.out / "pictures").glob("*.png")):
         stage.log_picture(picture.stem, picture)
 
