@@ -37,20 +37,22 @@ def stale_stages(root: Path) -> dict[str, list[str]]:
     if done.returncode != 0:
         raise LuxError(f"dvc status failed: {_last_line(done.stderr)}")
     status = json.loads(done.stdout or "{}")
-    return {name: stale_reasons(root, name, entries) for name, entries in status.items()}
+    known = locked_stages(root)
+    return {name: stale_reasons(known, name, entries) for name, entries in status.items()}
 
 
-def stale_reasons(root: Path, name: str, entries: list[Any]) -> list[str]:
+def stale_reasons(known: set[str], name: str, entries: list[Any]) -> list[str]:
     """DVC's status of one stage (nested names and states) as phrases for people.
 
-    To DVC everything is modified about a stage that it does not know; to people it is new.
+    To DVC everything is modified about a stage that is not among the `known` ones of
+    `locked_stages`; to people it is new.
     """
-    if entries and name not in _locked_stages(root):
+    if entries and name not in known:
         return [NEVER_RUN]
     return [phrase for entry in entries for phrase in _entry_phrases(entry)]
 
 
-def _locked_stages(root: Path) -> set[str]:
+def locked_stages(root: Path) -> set[str]:
     """Stages that `dvc.lock` has a result of."""
     lock = root / "dvc.lock"
     if not lock.is_file():

@@ -38,12 +38,15 @@ def make_plan(root: Path) -> list[StagePlan]:
     """The plan of a whole run. Nothing is written."""
     from dvc.repo import Repo
 
+    from flows.dvc_runner import locked_stages
+
     root = root.resolve()
+    known = locked_stages(root)
     plans: list[StagePlan] = []
     with Repo(str(root)) as repo:
         for stage in ordered():
             upstream = [p.name for p in plans if p.name in stage.needs and p.state != "fresh"]
-            plans.append(_plan_stage(root, repo, stage, upstream))
+            plans.append(_plan_stage(root, repo, known, stage, upstream))
     return plans
 
 
@@ -53,8 +56,10 @@ def totals(plans: list[StagePlan]) -> tuple[int, float, bool]:
     return len(due), sum(p.seconds or 0.0 for p in due), all(p.seconds is not None for p in due)
 
 
-def _plan_stage(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> StagePlan:
-    state, why = _state(root, repo, stage, upstream)
+def _plan_stage(
+    root: Path, repo: Any, known: set[str], stage: Stage, upstream: list[str]
+) -> StagePlan:
+    state, why = _state(repo, known, stage, upstream)
     missing, total = (None, None) if state in ("fresh", "cached") else _units(root, stage.name)
     seconds = 0.0 if state in ("fresh", "cached") else _last_seconds(root, stage.name)
     if seconds and missing is not None and total:
@@ -62,7 +67,7 @@ def _plan_stage(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> Sta
     return StagePlan(stage.name, state, why, missing, total, seconds, _megabytes(root, stage))
 
 
-def _state(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> tuple[str, str]:
+def _state(repo: Any, known: set[str], stage: Stage, upstream: list[str]) -> tuple[str, str]:
     from dvc.stage.cache import RunCacheNotFoundError
 
     from flows.dvc_runner import stale_reasons
@@ -72,7 +77,7 @@ def _state(root: Path, repo: Any, stage: Stage, upstream: list[str]) -> tuple[st
         return "waiting", f"{', '.join(upstream)} will change"
     with repo.lock:
         status = entry.status(check_updates=False)
-    reasons = stale_reasons(root, stage.name, status.get(entry.addressing, []))
+    reasons = stale_reasons(known, stage.name, status.get(entry.addressing, []))
     if not reasons:
         return "fresh", ""
     try:

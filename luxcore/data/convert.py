@@ -8,19 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.cameras import Camera, camera_to_nerfstudio
-from luxcore.data.compact import (
-    holds_compact,
-    list_rendered,
-    load_rendered,
-    read_metadata,
-    save_rendered,
-)
+from luxcore.data.compact import holds_compact, list_rendered, save_rendered
 from luxcore.data.crops import LitCrop
 from luxcore.data.multiview import MultiViewSets
 from luxcore.data.public_reader import open_scenes, public_views
 from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
 from luxcore.data.rotations import quaternion_from_matrix
-from luxcore.data.store import AnyView, ViewStore
+from luxcore.data.store import AnyView, by_room, load_view
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder, write_json
 from luxcore.files.exr import write_exr
@@ -33,13 +27,11 @@ def compact_to_public(
     stems: Sequence[Path], root: Path, *, first_scene: int = 0, seed: int = 0
 ) -> list[Path]:
     """One public scene per room, numbered from `first_scene` in the order of `stems`."""
-    rooms: dict[str, list[Path]] = {}
-    for stem in stems:
-        rooms.setdefault(str(read_metadata(stem).get("room")), []).append(stem)
+    rooms = by_room(stems)
     scenes = []
     with progress("public layout", len(rooms), "scenes") as bar:
         for number, members in enumerate(rooms.values(), start=first_scene):
-            views = [load_rendered(stem) for stem in members]
+            views = [load_view(stem) for stem in members]
             scenes.append(write_scene(root, f"{number:06d}", views, seed=seed))
             bar.advance()
     return scenes
@@ -69,10 +61,7 @@ def cut_photos(
     views: Sequence[AnyView] = (
         list_rendered(source) if holds_compact(source) else public_views(source)
     )
-    store = ViewStore(views)
-    rooms: dict[str, list[AnyView]] = {}
-    for number, view in enumerate(views):
-        rooms.setdefault(store.room(number), []).append(view)
+    rooms = by_room(views)
     folders = []
     with progress("photos", len(rooms), "rooms") as bar:
         for room, members in rooms.items():

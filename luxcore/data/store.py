@@ -57,8 +57,19 @@ class ViewStore:
 
     def room(self, number: int) -> str:
         """Id of the room that a view shows, without reading its pixels."""
-        view = self._views[number]
-        return str(read_metadata(view).get("room")) if isinstance(view, Path) else view.room
+        return _room(self._views[number])
+
+
+def by_room(views: Sequence[AnyView]) -> dict[str, list[AnyView]]:
+    """The views of each room, rooms and views in the order in which they come."""
+    rooms: dict[str, list[AnyView]] = {}
+    for view in views:
+        rooms.setdefault(_room(view), []).append(view)
+    return rooms
+
+
+def _room(view: AnyView) -> str:
+    return str(read_metadata(view).get("room")) if isinstance(view, Path) else view.room
 
 
 def load_view(view: AnyView) -> RenderedView:

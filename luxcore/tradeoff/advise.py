@@ -120,9 +120,8 @@ def within_budget(sweeps: Sequence[Sweep], budget_s: float) -> Advice:
     Starts from the fastest of every knob; each step goes one place along one front, where the
     error falls by the largest factor per second. Raises InputError when the fastest do not fit.
     """
-    turned = _turned(sweeps)
-    fronts = {sweep.knob: front(sweep.points) for sweep in turned}
     advice = with_quality(sweeps, "low")
+    fronts = {sweep.knob: front(sweep.points) for sweep in advice.sweeps}
     if advice.seconds > budget_s:
         raise InputError(
             f"a budget of {budget_s:.0f} s is too small: the least is {advice.seconds:.1f} s."

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 from page_actions import WAIT_MS
-from viewer_scene import save_room
+from viewer_scene import serving_room
 
-from luxcore.ports import free_port
 from luxcore.viewer.app import Viewer
-from luxcore.viewer.open import open_scene
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, ViewportSize
@@ -20,10 +18,8 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def own_viewer(tmp_path: Path) -> Iterator[Viewer]:
-    viewed = open_scene(save_room(tmp_path / "room"))
-    running = Viewer(viewed, "127.0.0.1", free_port(), tmp_path / "out")
-    yield running
-    running.close()
+    with serving_room(tmp_path) as running:
+        yield running
 
 
 @pytest.fixture

@@ -27,9 +27,9 @@ def drag(page: Page, across: int) -> None:
     page.wait_for_timeout(300)
 
 
-def until(page: Page, reached: Callable[[], bool]) -> None:
+def until(page: Page, reached: Callable[[], bool], wait_ms: int = WAIT_MS) -> None:
     """Wait for something that happens on the server."""
-    for _ in range(WAIT_MS // 100):
+    for _ in range(wait_ms // 100):
         if reached():
             return
         page.wait_for_timeout(100)

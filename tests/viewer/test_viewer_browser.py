@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from viewer_scene import room_scene, save_room
+from page_actions import until
+from viewer_scene import room_scene, serving_room
 
 from luxcore.errors import InputError
 from luxcore.light.agx import agx
-from luxcore.ports import free_port
 from luxcore.splats.relighting import LampSetting, mixing_weights
 from luxcore.viewer.app import Viewer
 from luxcore.viewer.lighting import original_lighting
-from luxcore.viewer.open import open_scene
 from luxcore.viewer.tabs import EXACT
 
 if TYPE_CHECKING:
@@ -30,11 +29,8 @@ AMBIENT_SOLO, DESK_ON = 1, 2
 
 @pytest.fixture(scope="module")
 def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Viewer]:
-    folder = tmp_path_factory.mktemp("viewer")
-    viewed = open_scene(save_room(folder / "room"))
-    running = Viewer(viewed, "127.0.0.1", free_port(), folder / "out")
-    yield running
-    running.close()
+    with serving_room(tmp_path_factory.mktemp("viewer")) as running:
+        yield running
 
 
 @pytest.fixture
@@ -72,12 +68,12 @@ def wait_until(page: Page, checkbox: int, *, checked: bool) -> None:
 def until_shown(page: Page, viewer: Viewer, settings: dict[str, LampSetting]) -> None:
     """Wait for the colours of `settings`: the widgets hold their values before colours follow."""
     wanted = expected(settings)
-    for _ in range(200):
+
+    def is_shown() -> bool:
         colours = np.asarray(viewer._node.rgbs) / 255.0
-        if np.allclose(colours, wanted, rtol=0, atol=0.51 / 255 + 1e-4):
-            return
-        page.wait_for_timeout(100)
-    np.testing.assert_allclose(colours, wanted, atol=0.51 / 255 + 1e-4)
+        return np.allclose(colours, wanted, rtol=0, atol=0.51 / 255 + 1e-4)
+
+    until(page, is_shown, 20_000)
 
 
 def expected(settings: dict[str, LampSetting]) -> np.ndarray:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from luxcore.cameras import look_at
 from luxcore.files.photos import write_png
+from luxcore.ports import free_port
 from luxcore.splats.gaussians import Gaussians, sh_from_color
 from luxcore.splats.scene import Scene, SceneLamp, SceneTone, save_scene
+from luxcore.viewer.app import Viewer
+from luxcore.viewer.open import open_scene
 
 LAMPS = {"desk": (-1.0, 0.0, 1.2), "wall": (0.0, 1.4, 1.6), "floor": (1.2, -0.5, 0.8)}
 SCALES = ((2.0, 1.0, 0.5), (0.8, 0.7, 0.5), (0.3, 0.4, 0.4))
@@ -52,3 +57,13 @@ def save_room(folder: Path, count: int = 600) -> Path:
     write_png(thumbnail, np.full((32, 32, 3), 0.7, np.float32))
     save_scene(folder, room_scene(count), cameras, {"lamp_0.png": thumbnail})
     return folder
+
+
+@contextmanager
+def serving_room(folder: Path) -> Iterator[Viewer]:
+    """A viewer of the room in `folder`/room, writing into `folder`/out; closed at the end."""
+    running = Viewer(
+        open_scene(save_room(folder / "room")), "127.0.0.1", free_port(), folder / "out"
+    )
+    yield running
+    running.close()
