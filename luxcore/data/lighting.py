@@ -20,6 +20,8 @@ _LAMP_KELVIN = (2200.0, 6500.0)
 _POWER_SPREAD = 0.6
 """Standard deviation of the logarithm of a lamp's power factor."""
 _RECOLOURED_SHARE = 0.5
+_SWITCHED_SHARE = 0.25
+_OWN_SPREAD = 0.2
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,16 @@ def draw_relighting(rng: Generator, lamps: int) -> Relighting:
             colours[lamp] = colour
     ambient = np.exp(rng.normal(-0.3, 0.8)) * np.ones(3)
     return Relighting(on, (power * colours).astype(np.float32), ambient.astype(np.float32))
+
+
+def draw_own_light(rng: Generator, on: Bool[np.ndarray, " m"]) -> Relighting:
+    """The room's own lamps, as a photographer finds them: their colours, their powers nearly,
+    a quarter of them switched. Such lamps differ little in colour, which makes them hard to part.
+    """
+    switched = rng.random(len(on)) < _SWITCHED_SHARE
+    power = np.exp(rng.normal(0.0, _OWN_SPREAD, (len(on), 1))) * np.ones((1, 3))
+    ambient = np.exp(rng.normal(0.0, _OWN_SPREAD)) * np.ones(3)
+    return Relighting(on ^ switched, power.astype(np.float32), ambient.astype(np.float32))
 
 
 def exposed(crops: Sequence[LitCrop], rng: Generator, jitter_ev: float = 1.0) -> list[LitCrop]:

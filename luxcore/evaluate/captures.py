@@ -17,7 +17,7 @@ from luxcore.errors import FormatError, LuxError
 from luxcore.files.exr import read_exr
 from luxcore.harmonize.poses import pose_distance
 from luxcore.masks.store import LampMasks, load_masks
-from luxcore.models.small.surfaces import pixel_rays
+from luxcore.models.small.surfaces import pinhole_of, pinhole_rays
 
 
 def capture_group(
@@ -56,7 +56,8 @@ def true_view(capture: Capture, masks: LampMasks, view: int, side_px: int) -> Li
     lights = lights * scale[:, None, None]
     chosen = [int(lamp.truth_light or 0) for lamp in masks.lamps]
     rest = [i for i in range(len(on)) if i not in chosen and on[i]]
-    depth = distance / pixel_rays(camera).norm(dim=0).numpy()
+    rays = pinhole_rays(pinhole_of(camera), *distance.shape)
+    depth = distance / rays.norm(dim=0).numpy()
     full = LitCrop(
         camera,
         ambient + lights[rest].sum(0),

@@ -7,8 +7,8 @@ import torch
 
 from luxcore.cameras import Camera, look_at
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
+from luxcore.models.small.hints import KnownLight
 from luxcore.models.small.multiview import (
-    KnownLight,
     TargetView,
     correspondence,
     multiview_features,
@@ -61,9 +61,21 @@ def test_lambert_terms_of_a_lamp_before_a_wall() -> None:
 def test_a_lamps_centre_is_where_its_mask_has_depth() -> None:
     masks = torch.zeros(2, 32, 32)
     masks[0, 15:17, 15:17] = 1
-    centres, known = lamp_centres(masks, wall(camera(), 3.0))
+    dark, off = torch.zeros(3, 32, 32), torch.zeros(2, dtype=torch.bool)
+    centres, known = lamp_centres(masks, wall(camera(), 3.0), dark, off)
     torch.testing.assert_close(centres[0], torch.tensor([0.0, 0.0, 3.0]), atol=1e-5, rtol=0)
     assert known.tolist() == [True, False]
+
+
+def test_a_burning_lamp_shines_from_what_glows_in_its_mask() -> None:
+    masks, photo = torch.zeros(1, 32, 32), torch.full((3, 32, 32), 0.1)
+    masks[0, 4:28, 15:17] = 1
+    photo[:, 4:8, 15:17] = 10
+    surfaces = wall(camera(), 3.0)
+    lit, _ = lamp_centres(masks, surfaces, photo, torch.tensor([True]))
+    unlit, _ = lamp_centres(masks, surfaces, photo, torch.tensor([False]))
+    torch.testing.assert_close(lit[0], surfaces.points[:, 4:8, 15:17].mean((1, 2)))
+    torch.testing.assert_close(unlit[0], surfaces.points[:, 4:28, 15:17].mean((1, 2)))
 
 
 def test_features_are_finite_for_black_photos_empty_masks_and_no_geometry() -> None:

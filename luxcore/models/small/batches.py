@@ -15,7 +15,8 @@ from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
-from luxcore.models.small.multiview import KnownLight, TargetView, multiview_features
+from luxcore.models.small.hints import KnownLight
+from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import CropPool
 

@@ -64,7 +64,9 @@ def _flipped(example: Example) -> Example:
     surfaces = example.surfaces
     if surfaces is not None:
         points, normals = surfaces.points.flip(-1) * mirror, surfaces.normals.flip(-1) * mirror
-        surfaces = replace(surfaces, points=points, normals=normals)
+        fx, fy, cx, cy = surfaces.pinhole
+        mirrored = (fx, fy, example.photo.shape[2] - cx, cy)
+        surfaces = replace(surfaces, points=points, normals=normals, pinhole=mirrored)
     return Example(
         example.photo.flip(-1),
         example.masks.flip(-1),

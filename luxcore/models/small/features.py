@@ -10,15 +10,18 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.small.levels import display_curve
-from luxcore.models.small.prior import lambert_shares, unit_irradiance
+from luxcore.models.small.prior import Hints, first_guess, unit_irradiance
 from luxcore.models.small.surfaces import Surfaces, lambert_terms, lamp_centres
 
-SV_CHANNELS = 34
+SV_CHANNELS = 38
 MV_CHANNELS = SV_CHANNELS + 13
 LAMP_SHARE = slice(27, 30)
-IRRADIANCE = slice(30, 31)
 AMBIENT_SHARE = slice(31, 34)
-"""Channels of the first guess: shares of light mapped to −1..1, log2 irradiance over 4."""
+LOG_RATIO = slice(35, 38)
+"""Channels of the first guess: shares of light mapped to −1..1, and a lamp's light over the photo's
+as natural log over LOG_RATIO_SCALE."""
+
+LOG_RATIO_SCALE = 4.0
 
 
 def lamp_features(
@@ -27,17 +30,18 @@ def lamp_features(
     on: Bool[Tensor, " k"],
     surfaces: Surfaces | None,
     lamp_points: Float[Tensor, "k 3"] | None = None,
+    hints: Hints | None = None,
 ) -> Float[Tensor, "k c h w"]:
     """The SV_CHANNELS channels of every lamp of one photo.
 
     `photo` is linear, at most PHOTO_MAX; `masks` are coverage in 0..1. `lamp_points` are lamp
     centres in camera space, where another view knows them (not finite: unknown); without them
-    they come from the mask and the depth.
+    they come from the mask and the depth. `hints` is what other views tell.
     """
     k, h, w = masks.shape
-    centres, known = _centres(masks, surfaces, lamp_points)
+    centres, known = _centres(photo, masks, on, surfaces, lamp_points)
     irradiance = unit_irradiance(masks, surfaces, centres, known)
-    shares = lambert_shares(photo, masks, irradiance, on)
+    guess = first_guess(photo, masks, irradiance.total, on, hints)
     shared = photo_features(photo)
     others_on, others_off = _other_masks(masks, on)
     channels = [
@@ -49,9 +53,11 @@ def lamp_features(
         _relative_colour(photo, masks),
         on.to(photo).view(k, 1, 1, 1).expand(k, 1, h, w),
         _geometry(masks, surfaces, centres, known),
-        2 * shares - 1,
-        torch.log2(irradiance[:, None] + 1e-3) / 4,
-        2 * (1 - shares.sum(0, keepdim=True)).clamp(0, 1).expand(k, -1, -1, -1) - 1,
+        2 * guess.lamps - 1,
+        torch.log2(irradiance.total[:, None] + 1e-3) / 4,
+        2 * guess.ambient.expand(k, -1, -1, -1) - 1,
+        irradiance.visible[:, None],
+        guess.log_ratio / LOG_RATIO_SCALE,
     ]
     return torch.cat(channels, dim=1)
 
@@ -97,13 +103,17 @@ def _relative_colour(photo: Tensor, masks: Tensor) -> Tensor:
 
 
 def _centres(
-    masks: Tensor, surfaces: Surfaces | None, lamp_points: Tensor | None
+    photo: Tensor,
+    masks: Tensor,
+    on: Tensor,
+    surfaces: Surfaces | None,
+    lamp_points: Tensor | None,
 ) -> tuple[Tensor | None, Tensor | None]:
     """Lamp centres in camera space and which of them are known; None without geometry."""
     if surfaces is None:
         return None, None
     if lamp_points is None:
-        return lamp_centres(masks, surfaces)
+        return lamp_centres(masks, surfaces, photo, on)
     return lamp_points, lamp_points.isfinite().all(1)
 
 

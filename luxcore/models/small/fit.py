@@ -99,7 +99,8 @@ class _Fit:
         self.loss_of = loss
         self.net = channels_last(net).train()
         self.settings, self.validate = settings, validate
-        self.optimizer = torch.optim.AdamW(net.parameters(), settings.rate, weight_decay=0.02)
+        parameters = net.parameters()
+        self.optimizer = torch.optim.AdamW(parameters, settings.rate, weight_decay=0.02, fused=True)
         self.ema = {k: v.detach().clone() for k, v in net.state_dict().items()}
         self.step, self.lamps, self.loss = 0, 0, math.nan
         self.curve: list[dict[str, float]] = []

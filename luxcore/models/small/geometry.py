@@ -14,7 +14,7 @@ from torch import Tensor
 
 from luxcore.models.small.features import photo_features
 from luxcore.models.small.network import UNet
-from luxcore.models.small.surfaces import Surfaces
+from luxcore.models.small.surfaces import Surfaces, pinhole_rays
 
 PHOTO_CHANNELS = 6
 GEOMETRY_OUTPUTS = 5
@@ -42,12 +42,10 @@ class GeometryGuess:
     def surfaces(self) -> Surfaces:
         """Points by a pinhole whose axis meets the photo's centre."""
         height, width = self.log_depth.shape
-        focal = torch.exp(self.log_focal) * max(height, width)
-        x = (torch.arange(width) + 0.5 - width / 2) / focal
-        y = (torch.arange(height) + 0.5 - height / 2) / focal
-        grid_y, grid_x = torch.meshgrid(y, x, indexing="ij")
-        rays = torch.stack([grid_x, grid_y, torch.ones_like(grid_x)])
-        return Surfaces(rays * torch.exp(self.log_depth), self.normals, ESTIMATED_TRUST)
+        focal = float(torch.exp(self.log_focal)) * max(height, width)
+        pinhole = (focal, focal, width / 2, height / 2)
+        points = pinhole_rays(pinhole, height, width) * torch.exp(self.log_depth)
+        return Surfaces(points, self.normals, pinhole, ESTIMATED_TRUST)
 
 
 def read_outputs(outputs: Float[Tensor, "o h w"]) -> GeometryGuess:

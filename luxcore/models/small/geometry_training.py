@@ -15,6 +15,7 @@ from numpy.random import PCG64, Generator, SeedSequence
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
+from luxcore.data.repaint import repainted
 from luxcore.files.atomic import write_json
 from luxcore.models.small.examples import to_example
 from luxcore.models.small.features import photo_features
@@ -33,7 +34,7 @@ from luxcore.models.small.training import WIDTHS, fit_settings, pools
 from luxcore.models.small.weights import load_network, save_weights
 from luxcore.settings.train_sv import TrainingSettings
 
-SHAPE = NetworkShape(PHOTO_CHANNELS, GEOMETRY_OUTPUTS, WIDTHS)
+SHAPE = NetworkShape(PHOTO_CHANNELS, GEOMETRY_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True)
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,24 @@ class SeenPhoto:
 
 @dataclass(frozen=True)
 class PhotoBatches:
-    """Photos of `pool` under new light, half of them mirrored; a pure function of the step."""
+    """Photos of `pool` under new light, half of them mirrored, the share `repaint` in other paint;
+    a pure function of the step."""
 
     pool: CropPool
     seed: int
     photos: int
+    repaint: float = 0.6
 
     def batch(self, step: int) -> list[tuple[Tensor, SeenPhoto]]:
         """`photos` examples."""
         rng = Generator(PCG64(SeedSequence((self.seed, step, 1))))
-        return [
-            seen_photo(self.pool.relit(rng, 1)[0], flip=bool(rng.random() < 0.5))
-            for _ in range(self.photos)
-        ]
+        return [self._photo(rng) for _ in range(self.photos)]
+
+    def _photo(self, rng: Generator) -> tuple[Tensor, SeenPhoto]:
+        (crop,) = self.pool.relit(rng, 1)
+        if rng.random() < self.repaint:
+            crop = repainted(crop, rng)
+        return seen_photo(crop, flip=bool(rng.random() < 0.5))
 
 
 def seen_photo(crop: LitCrop, *, flip: bool = False) -> tuple[Tensor, SeenPhoto]:

@@ -8,14 +8,20 @@ from torch import Tensor
 
 from luxcore.models.small.examples import Example
 from luxcore.models.small.heads import LightFields, lamp_light
-from luxcore.models.small.levels import CLIPPED, display_curve
+from luxcore.models.small.levels import CLIPPED, PHOTO_MAX, display_curve
 
 BRACKETS = ((1.0, 1.0), (0.25, 0.5), (0.0625, 0.25))
 """(exposure, weight): EV0, EV-2, EV-4 of the paper's three brightness levels."""
 
-OFF_WEIGHT = 0.8
-"""Of lamps that are off in the photo, whose brightness nobody can know: they must not drown the
-lamps that are on."""
+SCORE_WEIGHT = 0.1
+"""Of the logarithm of the squared error, by which results are judged: an easy lamp counts as much
+as a hard one."""
+
+OFF_WEIGHT = 0.08
+"""Of the plain error of lamps that are off in the photo: nobody can know how bright they are."""
+
+ERROR_FLOOR = 3e-4
+"""Squared error below which nothing is gained: 35 dB."""
 
 
 def example_loss(fields: LightFields, example: Example) -> Tensor:
@@ -24,15 +30,16 @@ def example_loss(fields: LightFields, example: Example) -> Tensor:
     on = example.on
     terms = []
     if bool(on.any()):
-        terms.append(_seen_error(light[on], example.lights[on]))
+        lit, truth = light[on], example.lights[on]
+        terms.append(_seen_error(lit, truth))
         terms.append(0.5 * _one_light_off_error(fields, example))
         terms.append(0.2 * _fraction_error(fields, example))
-        terms.append(0.02 * _boost_error(light[on], example.lights[on], example))
+        terms.append(0.02 * _boost_error(lit, truth, example))
+        terms.append(SCORE_WEIGHT * _score_error(lit, truth))
     if bool((~on).any()):
-        share = OFF_WEIGHT * float((~on).float().mean())
-        matched = _rescaled(light[~on], example.lights[~on])
-        terms.append(share * _seen_error(matched, example.lights[~on]))
-        terms.append(0.1 * share * _seen_error(light[~on], example.lights[~on]))
+        share = float((~on).float().mean())
+        terms.append(share * SCORE_WEIGHT * _score_error(light[~on], example.lights[~on]))
+        terms.append(share * OFF_WEIGHT * _seen_error(light[~on], example.lights[~on]))
     return torch.stack(terms).sum() if terms else fields.fraction.sum() * 0
 
 
@@ -73,8 +80,19 @@ def _boost_error(predicted: Tensor, truth: Tensor, example: Example) -> Tensor:
     return (difference.abs() * clipped).sum() / clipped.sum().clamp_min(1)
 
 
-def _rescaled(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:
-    """Least-squares scale per lamp and channel on light that a display can show, then applied."""
-    p, t = predicted.clamp_max(4), truth.clamp_max(4)
-    scale = (p * t).sum((2, 3)) / (p * p).sum((2, 3)).clamp_min(1e-6)
-    return predicted * scale.clamp(0.01, 100)[..., None, None]
+def _score_error(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:
+    """Mean natural log of the squared error on the display curve after the best scale per lamp and
+    channel: half with the scale fitted to light that is not white, half to what is displayed."""
+    unclipped = (truth.amax(1, keepdim=True) < PHOTO_MAX).to(truth)
+    light_scale = _best_scale(predicted * unclipped, truth).clamp(1e-3, 1e3)
+    shown, target = display_curve(predicted), display_curve(truth)
+    by_light = display_curve(predicted * light_scale)
+    by_picture = shown * _best_scale(shown, target)
+    errors = [((picture - target) ** 2).mean((1, 2, 3)) for picture in (by_light, by_picture)]
+    return torch.log(torch.stack(errors) + ERROR_FLOOR).mean()
+
+
+def _best_scale(predicted: Tensor, truth: Tensor) -> Float[Tensor, "k 3 1 1"]:
+    """Least squares: Σ truth·predicted / Σ predicted² of each lamp and channel."""
+    squares = (predicted**2).sum((2, 3), keepdim=True).clamp_min(1e-6)
+    return (predicted * truth).sum((2, 3), keepdim=True) / squares

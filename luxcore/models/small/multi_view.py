@@ -20,7 +20,8 @@ from luxcore.models.small.grid import (
     photo_to_grid,
     to_grid,
 )
-from luxcore.models.small.multiview import KnownLight, TargetView, multiview_features
+from luxcore.models.small.hints import KnownLight
+from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import chw
 from luxcore.models.small.single_view import finish, run_network, with_unseen

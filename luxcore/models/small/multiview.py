@@ -17,22 +17,11 @@ from torch import Tensor
 from luxcore.cameras import Camera
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.heads import RATIO_FLOOR, WarpedLight
-from luxcore.models.small.surfaces import Surfaces, lamp_centres, pixel_rays
+from luxcore.models.small.hints import KnownLight, hints_for, moved
+from luxcore.models.small.surfaces import Surfaces, lamp_centres, pinhole_of, pinhole_rays
 
 DEPTH_TOLERANCE = 0.05
 """Relative difference of depth within which two views see the same surface."""
-
-
-@dataclass(frozen=True)
-class KnownLight:
-    """A reference on the network's grid. `known[k]`: lamp k's light is given here."""
-
-    camera: Camera
-    photo: Float[Tensor, "3 h w"]
-    masks: Float[Tensor, "k h w"]
-    surfaces: Surfaces
-    lights: Float[Tensor, "k 3 h w"]
-    known: Bool[Tensor, " k"]
 
 
 @dataclass(frozen=True)
@@ -51,12 +40,14 @@ def multiview_features(
     """The MV_CHANNELS channels of every lamp (the single-view ones, warped light, Plücker rays),
     and the warped light itself.
 
-    `warp=False` leaves the warped light out: an ablation.
+    `warp=False` leaves out all that the references' light tells: an ablation.
     """
     k = len(target.on)
     centres = lamp_points(target, camera, references)
-    single = lamp_features(target.photo, target.masks, target.on, target.surfaces, centres)
-    ratio, weight = _warped_ratio(target, camera, references if warp else ())
+    lit = references if warp else ()
+    hints = hints_for(target.surfaces, camera, centres, target.on, lit)
+    single = lamp_features(target.photo, target.masks, target.on, target.surfaces, centres, hints)
+    ratio, weight = _warped_ratio(target, camera, lit)
     on = target.on.view(k, 1, 1, 1)
     fraction = ratio.clamp(0, 1.5) * on
     log_ratio = torch.log(ratio + 1e-3) / 4 * ~on * (weight > 0)
@@ -72,12 +63,12 @@ def lamp_points(
     depth, else from the target's own mask; not finite where nobody sees it."""
     points = torch.full((len(target.on), 3), float("nan"))
     for reference in references:
-        seen, valid = lamp_centres(reference.masks, reference.surfaces)
-        moved = _moved(seen.T[:, :, None], reference.camera, camera)[:, :, 0].T
+        seen, valid = lamp_centres(reference.masks, reference.surfaces, reference.photo, target.on)
+        here = moved(seen.T, reference.camera, camera).T
         take = valid & ~points.isfinite().all(1)
-        points[take] = moved[take]
+        points[take] = here[take]
     if target.surfaces is not None:
-        own, valid = lamp_centres(target.masks, target.surfaces)
+        own, valid = lamp_centres(target.masks, target.surfaces, target.photo, target.on)
         take = valid & ~points.isfinite().all(1)
         points[take] = own[take]
     return points
@@ -89,7 +80,7 @@ def pluecker(camera: Camera, base: Camera) -> Float[Tensor, "6 h w"]:
     Moments are squashed (x/(1+|x|)), so that a camera 1e6 m away does no harm.
     """
     to_base = torch.from_numpy(base.viewmat @ camera.c2w)
-    rays = pixel_rays(camera).double()
+    rays = pinhole_rays(pinhole_of(camera), camera.height, camera.width).double()
     directions = torch.einsum("ij,jhw->ihw", to_base[:3, :3], rays)
     directions = directions / directions.norm(dim=0, keepdim=True)
     moment = torch.linalg.cross(
@@ -110,9 +101,9 @@ def _warped_ratio(
             target.surfaces, camera, reference.surfaces, reference.camera
         )
         ratio = reference.lights / (reference.photo + RATIO_FLOOR)
-        moved = fn.grid_sample(ratio, grid.expand(k, -1, -1, -1), align_corners=False)
+        here = fn.grid_sample(ratio, grid.expand(k, -1, -1, -1), align_corners=False)
         share = visible * reference.known.view(k, 1, 1, 1)
-        total, weight = total + moved * share, weight + share
+        total, weight = total + here * share, weight + share
     return total / weight.clamp_min(1e-6), weight
 
 
@@ -121,22 +112,15 @@ def correspondence(
 ) -> tuple[Float[Tensor, "1 h w 2"], Float[Tensor, "h w"]]:
     """Where each target pixel's surface lies in the source picture (grid_sample coordinates), and
     a weight: 0 where the source does not see it, higher the closer the source stands."""
-    moved = _moved(target.points.flatten(1)[:, :, None], target_camera, source_camera)[:, :, 0]
-    z = moved[2].clamp_min(1e-3)
-    u = (source_camera.fx * moved[0] / z + source_camera.cx) / source_camera.width
-    v = (source_camera.fy * moved[1] / z + source_camera.cy) / source_camera.height
+    place = moved(target.points.flatten(1), target_camera, source_camera)
+    z = place[2].clamp_min(1e-3)
+    u = (source_camera.fx * place[0] / z + source_camera.cx) / source_camera.width
+    v = (source_camera.fy * place[1] / z + source_camera.cy) / source_camera.height
     shape = target.points.shape[1:]
     grid = torch.stack([u * 2 - 1, v * 2 - 1], -1).reshape(1, *shape, 2)
     there = fn.grid_sample(source.points[None, 2:], grid, mode="nearest", align_corners=False)[0, 0]
     z = z.reshape(shape)
-    inside = (grid[0].abs() <= 1).all(-1) & (moved[2].reshape(shape) > 1e-3)
+    inside = (grid[0].abs() <= 1).all(-1) & (place[2].reshape(shape) > 1e-3)
     same = (there - z).abs() < DEPTH_TOLERANCE * z
     visible = inside & same & (there > 0) & (target.points[2] > 0)
     return grid, visible.float() / (0.2 + z)
-
-
-def _moved(points: Tensor, source: Camera, target: Camera) -> Tensor:
-    """[3 n 1] points from one camera's space to another's."""
-    change = torch.from_numpy(target.viewmat @ source.c2w)
-    moved = change[:3, :3] @ points[:, :, 0].double() + change[:3, 3:]
-    return moved.float()[:, :, None]

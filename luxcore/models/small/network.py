@@ -15,7 +15,7 @@ import torch.nn.functional as fn
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from luxcore.models.small.features import AMBIENT_SHARE, IRRADIANCE, LAMP_SHARE
+from luxcore.models.small.features import AMBIENT_SHARE, LAMP_SHARE, LOG_RATIO, LOG_RATIO_SCALE
 
 SV_OUTPUTS = 12
 """Four heads of RGB: lamp logit, ambient logit, log ratio of a lamp that is off, emitter boost."""
@@ -33,6 +33,12 @@ class NetworkShape:
     widths: tuple[int, ...] = (48, 96, 192, 256)
     unshuffle: int = 2
     heads: int = 4
+    middle: int = 1
+    """Pairs of attention and residual block on the coarsest grid."""
+    attending: int = 0
+    """Finer grids, from the coarsest up, whose places see each other as well."""
+    overall: bool = False
+    """Whether each output gets one number for the whole photo besides: how strong a lamp is."""
 
     @property
     def stride(self) -> int:
@@ -54,10 +60,21 @@ class UNet(nn.Module):
         self.stem = nn.Conv2d(shape.inputs * block, widths[0], 3, padding=1)
         before = (widths[0], *widths[:-1])
         self.down = nn.ModuleList(Residual(i, o) for i, o in zip(before, widths, strict=True))
-        self.middle = nn.Sequential(Attention(widths[-1], shape.heads), Residual(*widths[-1:] * 2))
+        coarsest = widths[-1]
+        self.middle = nn.Sequential(
+            *(
+                part
+                for _ in range(shape.middle)
+                for part in (Attention(coarsest, shape.heads), Residual(coarsest, coarsest))
+            )
+        )
         pairs = list(pairwise(widths))[::-1]
         self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
+        self.across = nn.ModuleList(
+            Attention(fine, shape.heads) for fine, _ in pairs[: shape.attending]
+        )
         self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
+        self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
         # Zero corrections are the first guess itself: a sane start for every lamp.
         for parameter in self.head.parameters():
             nn.init.zeros_(parameter)
@@ -69,35 +86,29 @@ class UNet(nn.Module):
             x = block(fn.avg_pool2d(x, 2) if level else x)
             skips.append(x)
         x = self.middle(x)
-        for block, skip in zip(self.up, skips[-2::-1], strict=True):
+        overall = None if self.overall is None else self.overall(x)
+        for level, (block, skip) in enumerate(zip(self.up, skips[-2::-1], strict=True)):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
-        return fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+            if level < len(self.across):
+                x = self.across[level](x)
+        outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
+        return outputs if overall is None else outputs + overall
 
 
 class LampNet(UNet):
-    """Features of one lamp to its four heads: corrections of what the Lambert fit guesses."""
+    """Features of one lamp to its four heads: corrections of the first guess."""
 
     def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o h w"]:
         outputs = super().forward(features)
-        guess = torch.cat([prior_logits(features), prior_log_ratio(features)], dim=1)
-        return torch.cat([outputs[:, :9] + guess, outputs[:, 9:]], dim=1)
+        return torch.cat([outputs[:, :9] + guessed_outputs(features), outputs[:, 9:]], dim=1)
 
 
-def prior_logits(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 6 h w"]:
-    """Logits of lamp and ambient by the Lambert fit, at half their weight: it knows no shadows.
-
-    The network's own logits are corrections of these. Halving them was best on rooms that neither
-    had seen (docs/models.md).
-    """
+def guessed_outputs(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 9 h w"]:
+    """Logits of lamp and ambient and the log ratio by the first guess (`prior.py`), which the
+    network's own answers correct."""
     shares = torch.cat([features[:, LAMP_SHARE], features[:, AMBIENT_SHARE]], dim=1)
-    return 0.5 * torch.log((shares + 1) / 2 + 0.02)
-
-
-def prior_log_ratio(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 3 h w"]:
-    """What a lamp that is off would add to an evenly lit photo: its irradiance over the mean."""
-    irradiance = torch.exp2(4 * features[:, IRRADIANCE]).clamp_min(1e-3)
-    mean = irradiance.clamp_max(4).mean((2, 3), keepdim=True)
-    return torch.log(irradiance / mean + 0.05).expand(-1, 3, -1, -1)
+    logits = torch.log((shares + 1) / 2 + 1e-3)
+    return torch.cat([logits, LOG_RATIO_SCALE * features[:, LOG_RATIO]], dim=1)
 
 
 class Residual(nn.Module):
@@ -116,8 +127,25 @@ class Residual(nn.Module):
         return self.skip(x) + self.conv2(fn.silu(self.norm2(hidden)))
 
 
+class Overall(nn.Module):
+    """One number per output from what the coarsest grid says in the mean."""
+
+    def __init__(self, width: int, outputs: int) -> None:
+        super().__init__()
+        self.norm = nn.GroupNorm(8, width)
+        self.inner = nn.Conv2d(width, width, 1)
+        self.out = nn.Conv2d(width, outputs, 1)
+        nn.init.zeros_(self.out.weight)
+        assert self.out.bias is not None
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o 1 1"]:
+        mean = fn.silu(self.norm(x)).mean((2, 3), keepdim=True)
+        return self.out(fn.silu(self.inner(mean)))
+
+
 class Attention(nn.Module):
-    """Every place of the coarsest grid sees every other: light crosses the whole room."""
+    """Every place of a coarse grid sees every other: light crosses the whole room."""
 
     def __init__(self, width: int, heads: int) -> None:
         super().__init__()

@@ -1,12 +1,15 @@
-"""A first guess at each lamp's share of the photo: Lambert's law with fitted lamp powers.
+"""A first guess at each lamp's share of the photo: irradiance with fitted lamp powers.
 
-If all surfaces were of one colour and cast no shadow, the photo would be Σ_i s_i · E_i + a, where
-E_i is the irradiance of lamp i at unit power. The powers s and the ambient a that fit the photo
-best are a small non-negative least-squares problem; what each term explains is the guess. It tells
-the network, which sees one lamp at a time, how the lamps compare.
+If all surfaces were of one colour, the photo would be Σ_i s_i · E_i + a, where E_i is the
+irradiance of lamp i at unit power: Lambert's law, the shadows that the depth map shows, and what
+bounces. The powers s and the ambient a that fit the photo best are a small non-negative
+least-squares problem; what each term explains is the guess. It tells the network, which sees one
+lamp at a time, how the lamps compare.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -15,13 +18,36 @@ from torch import Tensor
 
 from luxcore.models.small.levels import CLIPPED
 from luxcore.models.small.surfaces import Surfaces, lambert_terms
+from luxcore.models.small.transport import bounce_of, visibility
 
 FALLOFF = 0.15
 """Without geometry light falls off in the picture: to one half at this share of the long side."""
 
+FITTED_WEIGHT = 0.5
+"""Exponent of shares whose powers were fitted to the photo alone: halving the logits was best on
+rooms that neither fit nor network had seen (docs/models.md)."""
+
+SHARE_FLOOR = 0.02
+"""Added to shares and ratios: a guess of exactly nothing would tell the network too much."""
+
+ALTERNATIONS = 5
+
 MAX_FIT_PIXELS = 1500
 RELATIVE_FLOOR = 0.02
 """As in the scale-factor solver: errors count relative to pixel + 0.02."""
+
+
+MOST_IRRADIANCE = 4.0
+"""Of direct light, at unit power in 1/m²: nearer than half a metre no lamp is a point."""
+
+
+@dataclass(frozen=True)
+class Irradiance:
+    """What lamps of unit power would send to each surface, in 1/m²; `visible` is the share of the
+    lamp that a surface sees, 1 where nothing is known."""
+
+    total: Float[Tensor, "k h w"]
+    visible: Float[Tensor, "k h w"]
 
 
 def unit_irradiance(
@@ -29,38 +55,143 @@ def unit_irradiance(
     surfaces: Surfaces | None,
     centres: Float[Tensor, "k 3"] | None,
     known: Bool[Tensor, " k"] | None,
-) -> Float[Tensor, "k h w"]:
-    """cos/d² (clipped to 4/m²) of each lamp where its place is known, else a falloff around its
-    mask; 0 for a lamp with neither. A lamp's own mask glows: ten times its largest value."""
-    fields = []
+) -> Irradiance:
+    """cos/d² where the lamp is seen and what bounces, for lamps whose place is known, else a
+    falloff around the mask; 0 for a lamp with neither. A lamp's own mask glows: ten times its
+    largest value."""
+    totals, seen = [], []
+    placed = torch.zeros(len(masks), dtype=torch.bool) if known is None else known
+    bounce = bounce_of(surfaces) if surfaces is not None and bool(placed.any()) else None
     for index, mask in enumerate(masks):
-        if surfaces is not None and centres is not None and known is not None and known[index]:
-            field = lambert_terms(surfaces, centres[index])[2].clamp_max(4)
-        else:
+        visible = torch.ones_like(mask)
+        if surfaces is None or centres is None or bounce is None or not placed[index]:
             field = _falloff(mask)
-        fields.append(torch.where(mask > 0.5, 10 * field.amax().clamp_min(1e-3), field))
-    return torch.stack(fields) if fields else masks
+        else:
+            visible = visibility(surfaces, centres[index], mask)
+            direct = lambert_terms(surfaces, centres[index])[2].clamp_max(MOST_IRRADIANCE) * visible
+            field = direct + bounce.irradiance(direct)
+        totals.append(torch.where(mask > 0.5, 10 * field.amax().clamp_min(1e-3), field))
+        seen.append(visible)
+    if not totals:
+        return Irradiance(masks, masks)
+    return Irradiance(torch.stack(totals), torch.stack(seen))
 
 
-def lambert_shares(
+@dataclass(frozen=True)
+class Powers:
+    """RGB powers of lamps and of the ambient, in one unknown unit; `known` says of which lamps."""
+
+    lamps: Float[Tensor, "k 3"]
+    ambient: Float[Tensor, " 3"]
+    known: Bool[Tensor, " k"]
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What other views tell: powers, and natural logs by which to correct the shares of the lamps
+    and, last, of the ambient, and every lamp's ratio; None corrects nothing."""
+
+    powers: Powers
+    log_shares: Float[Tensor, "k1 3 h w"] | None = None
+    log_ratio: Float[Tensor, "k 3 h w"] | None = None
+
+
+@dataclass(frozen=True)
+class FirstGuess:
+    """Shares (0..1) of each pixel and channel that the burning lamps (0 when off) and the ambient
+    have, and for every lamp the natural log of its light over the photo."""
+
+    lamps: Float[Tensor, "k 3 h w"]
+    ambient: Float[Tensor, "3 h w"]
+    log_ratio: Float[Tensor, "k 3 h w"]
+
+
+def first_guess(
     photo: Float[Tensor, "3 h w"],
     masks: Float[Tensor, "k h w"],
     irradiance: Float[Tensor, "k h w"],
     on: Bool[Tensor, " k"],
-) -> Float[Tensor, "k 3 h w"]:
-    """Share (0..1) of each pixel and channel that the fit gives to each lamp; 0 when off."""
-    shares = torch.zeros(len(masks), 3, *masks.shape[1:])
-    burning = torch.nonzero(on)[:, 0]
-    if not len(burning):
-        return shares
-    basis = torch.cat([irradiance[burning], torch.ones_like(irradiance[:1])])
-    basis = basis / basis.flatten(1).mean(1).clamp_min(1e-6)[:, None, None]
+    hints: Hints | None = None,
+) -> FirstGuess:
+    """What each lamp sends by its irradiance and power, over what all of them send.
+
+    Powers that `hints` bring are taken as they are, and others fitted beside them. Powers fitted to
+    the photo alone are doubtful: their shares count at half their weight.
+    """
+    if not len(on):
+        nothing = photo.new_zeros(0, *photo.shape)
+        return FirstGuess(nothing, torch.ones_like(photo), nothing)
+    means = irradiance.clamp_max(MOST_IRRADIANCE).flatten(1).mean(1).clamp_min(1e-6)
+    field = irradiance / means[:, None, None]
     usable = (photo.amax(0) < CLIPPED) & (masks.amax(0) < 0.1)
+    powers = None
+    if hints is not None:
+        powers = replace(hints.powers, lamps=hints.powers.lamps * means[:, None])
+    strengths, ambient = _strengths(photo, field, usable, on, powers)
+    burning = field[:, None] * (strengths * on[:, None])[:, :, None, None]
+    level = ambient.view(1, 3, 1, 1).expand_as(burning[:1])
+    sent = (burning.sum(0) + level[0]).clamp_min(1e-9)
+    # Nobody can know how strong an unlit lamp is: as strong in the mean as all that burns.
+    told = on if powers is None else on | powers.known
+    strengths = torch.where(told[:, None], strengths, sent.mean((1, 2)))
+    log_ratio = torch.log(field[:, None] * strengths[:, :, None, None] / sent + SHARE_FLOOR)
+    shares = torch.cat([burning, level]) / sent + SHARE_FLOOR
+    shares = shares**FITTED_WEIGHT if hints is None else shares
+    if hints is not None and hints.log_shares is not None and hints.log_ratio is not None:
+        shares, log_ratio = shares * hints.log_shares.exp(), log_ratio + hints.log_ratio
+    shares = shares * torch.cat([on, on.new_ones(1)]).view(-1, 1, 1, 1)
+    shares = shares / shares.sum(0)
+    return FirstGuess(shares[:-1], shares[-1], log_ratio)
+
+
+def _strengths(
+    photo: Tensor, field: Tensor, usable: Tensor, on: Tensor, powers: Powers | None
+) -> tuple[Float[Tensor, "k 3"], Float[Tensor, " 3"]]:
+    """Powers of the lamps for `field`, and of the ambient: known ones as they are, the other
+    burning ones fitted beside them; 0 for the rest."""
+    known = torch.zeros_like(on) if powers is None else powers.known
+    strengths = field.new_zeros(len(on), 3) if powers is None else powers.lamps * known[:, None]
+    ambient = field.new_ones(3) if powers is None else powers.ambient
+    wanted = torch.nonzero(on & ~known)[:, 0]
+    if powers is not None and not len(wanted):
+        return strengths, ambient
     for channel in range(3):
-        powers = _fit(photo[channel], basis, usable)
-        parts = basis * powers[:, None, None]
-        shares[burning, channel] = (parts / parts.sum(0).clamp_min(1e-6))[:-1]
-    return shares
+        lit = (strengths[:, channel] * on).view(-1, 1, 1) * field
+        rest = lit.sum(0) + ambient[channel]
+        basis = torch.cat([field[wanted], rest[None]])
+        fitted = _fit(photo[channel], basis, usable)
+        if powers is None:
+            strengths[wanted, channel], ambient[channel] = fitted[:-1], fitted[-1]
+        else:
+            strengths[wanted, channel] = fitted[:-1] / fitted[-1]
+    return strengths, ambient
+
+
+def powers_seen(
+    photo: Float[Tensor, "3 h w"],
+    lights: Float[Tensor, "k 3 h w"],
+    irradiance: Float[Tensor, "k h w"],
+    on: Bool[Tensor, " k"],
+    known: Bool[Tensor, " k"],
+    usable: Bool[Tensor, "h w"],
+) -> Powers:
+    """The powers that explain a view whose `lights` are known, by alternating least squares: given
+    powers, the photo tells each surface's colour; given colours, each light tells its power."""
+    burning = on & known
+    ambient = (photo - lights[burning].sum(0)).clamp_min(0)
+    seen = torch.cat([lights, ambient[None]])[:, :, usable]
+    field = torch.cat([irradiance, torch.ones_like(irradiance[:1])])[:, None, usable]
+    plain = photo[:, usable]
+    weight = 1 / (plain + RELATIVE_FLOOR)
+    counted = torch.cat([burning, on.new_ones(1)]).view(-1, 1, 1)
+    powers = (seen * weight).sum(2) / (field * weight).sum(2).clamp_min(1e-9)
+    for _ in range(ALTERNATIONS):
+        sent = (powers[:, :, None] * field * counted).sum(0)
+        basis = field * plain / sent.clamp_min(1e-9) * weight
+        powers = (seen * weight * basis).sum(2) / (basis**2).sum(2).clamp_min(1e-9)
+    # A little of everything stays, as in the fit.
+    powers = powers + 1e-3 * (powers[-1:] + 1e-6)
+    return Powers(powers[:-1], powers[-1], known)
 
 
 def _fit(

@@ -11,7 +11,10 @@ import torch
 from numpy.random import Generator
 
 from luxcore.data.crops import LitCrop
-from luxcore.data.lighting import draw_relighting, exposed
+from luxcore.data.lighting import draw_own_light, draw_relighting, exposed
+
+OWN_LIGHT_SHARE = 0.5
+"""Of training photos: the other half gets lamps of any colour and power."""
 
 
 @runtime_checkable
@@ -43,14 +46,17 @@ class CropPool:
         return (crop for group in self.groups for crop in group)
 
     def relit(self, rng: Generator, views: int | None = None) -> list[LitCrop]:
-        """A random group in random order under new light (`views` of it, or all)."""
+        """A random group in random order (`views` of it, or all), under new light or its own."""
         group = self.groups[int(rng.integers(len(self.groups)))]
-        return relit([group[int(i)] for i in rng.permutation(len(group))[:views]], rng)
+        own_light = bool(rng.random() < OWN_LIGHT_SHARE)
+        order = rng.permutation(len(group))[:views]
+        return relit([group[int(i)] for i in order], rng, own_light=own_light)
 
 
-def relit(group: Sequence[LitCrop], rng: Generator) -> list[LitCrop]:
-    """The same photos in the same order, all under one new light."""
-    light = draw_relighting(rng, len(group[0].on))
+def relit(group: Sequence[LitCrop], rng: Generator, *, own_light: bool = False) -> list[LitCrop]:
+    """The same photos in the same order, all under one new light, or nearly under their own."""
+    on = group[0].on
+    light = draw_own_light(rng, on) if own_light else draw_relighting(rng, len(on))
     return exposed([light.apply(crop) for crop in group], rng)
 
 

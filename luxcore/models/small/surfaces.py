@@ -12,17 +12,21 @@ from torch import Tensor
 from luxcore.cameras import Camera
 from luxcore.models.small.samples import chw
 
+Pinhole = tuple[float, float, float, float]
+
 
 @dataclass(frozen=True)
 class Surfaces:
     """Geometry of one photo on the network's grid; zeros where unknown.
 
     `points` are camera-space positions in metres, `normals` unit vectors in camera axes. `trust`
-    is 1 for given geometry and less for what was estimated from the photo.
+    is 1 for given geometry and less for what was estimated from the photo. `pinhole` is the
+    camera's (fx, fy, cx, cy) in pixels of the grid.
     """
 
     points: Float[Tensor, "3 h w"]
     normals: Float[Tensor, "3 h w"]
+    pinhole: Pinhole
     trust: float = 1.0
 
     @property
@@ -31,10 +35,16 @@ class Surfaces:
         return (self.points[2] > 0) & (self.normals.abs().sum(0) > 0)
 
 
-def pixel_rays(camera: Camera) -> Float[Tensor, "3 h w"]:
+def pinhole_of(camera: Camera) -> Pinhole:
+    """The camera's focal lengths and principal point, pixels."""
+    return camera.fx, camera.fy, camera.cx, camera.cy
+
+
+def pinhole_rays(pinhole: Pinhole, height: int, width: int) -> Float[Tensor, "3 h w"]:
     """Camera-space directions of the pixel centres with z = 1."""
-    x = (torch.arange(camera.width) + 0.5 - camera.cx) / camera.fx
-    y = (torch.arange(camera.height) + 0.5 - camera.cy) / camera.fy
+    fx, fy, cx, cy = pinhole
+    x = (torch.arange(width) + 0.5 - cx) / fx
+    y = (torch.arange(height) + 0.5 - cy) / fy
     grid_y, grid_x = torch.meshgrid(y, x, indexing="ij")
     return torch.stack([grid_x, grid_y, torch.ones_like(grid_x)]).float()
 
@@ -51,14 +61,32 @@ def surfaces_of(
     rotation = torch.from_numpy(camera.c2w[:3, :3].T.copy()).float()
     normals = torch.einsum("ij,jhw->ihw", rotation, chw(np.nan_to_num(normal)))
     length = normals.norm(dim=0, keepdim=True)
-    return Surfaces(pixel_rays(camera) * depth, normals / length.clamp_min(1e-6) * (length > 0.1))
+    normals = normals / length.clamp_min(1e-6) * (length > 0.1)
+    pinhole = pinhole_of(camera)
+    return Surfaces(pinhole_rays(pinhole, *depth.shape) * depth, normals, pinhole)
+
+
+GLOWING = 0.5
+"""Of a burning lamp's mask, what is brighter than this share of its brightest tenth glows."""
 
 
 def lamp_centres(
-    masks: Float[Tensor, "k h w"], surfaces: Surfaces
+    masks: Float[Tensor, "k h w"],
+    surfaces: Surfaces,
+    photo: Float[Tensor, "3 h w"],
+    on: Bool[Tensor, " k"],
 ) -> tuple[Float[Tensor, "k 3"], Bool[Tensor, " k"]]:
-    """Camera-space centre of what each mask covers, metres, and whether any of it has depth."""
+    """Camera-space centre of what each mask covers, metres, and whether any of it has depth.
+
+    Of a burning lamp only what glows counts: a floor lamp shines from its top, not from its pole.
+    """
     weight = masks * (surfaces.points[2] > 0)
+    brightness = photo.amax(0)
+    for index in torch.nonzero(on)[:, 0].tolist():
+        inside = weight[index] > 0.3
+        if bool(inside.any()):
+            peak = torch.quantile(brightness[inside], 0.9)
+            weight[index] *= brightness >= GLOWING * peak
     total = weight.sum((1, 2))
     centres = torch.einsum("khw,chw->kc", weight, surfaces.points) / total.clamp_min(1e-6)[:, None]
     return centres, total > 0

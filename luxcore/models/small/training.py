@@ -45,8 +45,8 @@ from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
 WIDTHS = (40, 80, 160, 224)
 SHAPES = {
-    "sv": NetworkShape(SV_CHANNELS, SV_OUTPUTS, WIDTHS),
-    "mv": NetworkShape(MV_CHANNELS, MV_OUTPUTS, WIDTHS),
+    "sv": NetworkShape(SV_CHANNELS, SV_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True),
+    "mv": NetworkShape(MV_CHANNELS, MV_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True),
 }
 SKETCH_ROOMS = 100_000
 
@@ -151,11 +151,12 @@ def widen(narrow: UNet, wide: UNet) -> None:
 
 def single_cases(pool: CropPool, seed: int, estimator: UNet | None = None) -> Cases:
     """Every photo once, under a light drawn from its number, with guessed and with given geometry
-    in turn."""
+    in turn, two photos in new light and two in their own."""
     cases = []
     for number, crop in enumerate(pool.photos()):
         rng = Generator(PCG64(SeedSequence((seed, number))))
-        example = to_example(relit([crop], rng)[0], geometry=number % 2 == 1)
+        (lit,) = relit([crop], rng, own_light=number % 4 >= 2)
+        example = to_example(lit, geometry=number % 2 == 1)
         if len(example.on):
             cases.append((single_features(example, estimator), example))
     return cases
@@ -166,7 +167,7 @@ def group_cases(pool: CropPool, seed: int) -> Cases:
     cases = []
     for number, group in enumerate(pool.groups):
         rng = Generator(PCG64(SeedSequence((seed, number))))
-        reference, *targets = relit(group, rng)
+        reference, *targets = relit(group, rng, own_light=number % 2 == 1)
         known = reference.masks.any((1, 2))
         cases += [group_example(t, [reference], known) for t in targets if known.any()]
     return cases

@@ -1,0 +1,164 @@
+"""What references with known light tell about a view beyond the places that both see.
+
+They tell how strong each lamp is, which a photo alone can only guess, and by how much the first
+guess is wrong on their own surfaces; that correction is carried to surfaces near by that face the
+same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as fn
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from luxcore.cameras import Camera
+from luxcore.models.small.levels import CLIPPED
+from luxcore.models.small.prior import (
+    SHARE_FLOOR,
+    FirstGuess,
+    Hints,
+    Powers,
+    first_guess,
+    powers_seen,
+    unit_irradiance,
+)
+from luxcore.models.small.surfaces import Surfaces
+
+PLACES = 24
+"""Corrections are carried between at most this many places a side."""
+
+REACH_M = 0.25
+"""Distance at which a correction counts a quarter of what it counts on the spot."""
+
+MOST_CORRECTION = 4.0
+FEWEST_PIXELS = 40
+"""A reference that shows less than this of unclipped surfaces tells nothing."""
+
+
+@dataclass(frozen=True)
+class KnownLight:
+    """A reference on the network's grid. `known[k]`: lamp k's light is given here."""
+
+    camera: Camera
+    photo: Float[Tensor, "3 h w"]
+    masks: Float[Tensor, "k h w"]
+    surfaces: Surfaces
+    lights: Float[Tensor, "k 3 h w"]
+    known: Bool[Tensor, " k"]
+
+
+def hints_for(
+    surfaces: Surfaces | None,
+    camera: Camera,
+    lamp_points: Float[Tensor, "k 3"],
+    on: Bool[Tensor, " k"],
+    references: Sequence[KnownLight],
+) -> Hints | None:
+    """Powers and corrections for a view with these `surfaces` and lamp centres (in its camera's
+    space; not finite where nobody knows); None where nothing can be told."""
+    if surfaces is None or not references or not len(on):
+        return None
+    powers: Powers | None = None
+    told = []
+    for reference in references:
+        usable = _usable(reference)
+        if int(usable.sum()) < FEWEST_PIXELS:
+            continue
+        points = moved(lamp_points.T, camera, reference.camera).T
+        centred = points.isfinite().all(1)
+        field = unit_irradiance(reference.masks, reference.surfaces, points, centred).total
+        seen = powers_seen(reference.photo, reference.lights, field, on, reference.known, usable)
+        powers = seen if powers is None else _joined(powers, seen)
+        told.append((reference, field, seen, usable))
+    if powers is None:
+        return None
+    height, width = surfaces.points.shape[1:]
+    weighted, weight = torch.zeros(2 * len(on) + 1, 3, height, width), torch.zeros(height, width)
+    for reference, field, seen, usable in told:
+        guess = first_guess(reference.photo, reference.masks, field, on, Hints(seen))
+        carried, share = _carried(
+            _corrections(reference, guess, on), reference, usable, surfaces, camera
+        )
+        weighted, weight = weighted + carried, weight + share
+    correction = weighted / (weight + 1e-2)
+    shares, log_ratio = correction[: len(on) + 1], correction[len(on) + 1 :]
+    return Hints(powers, shares, log_ratio * powers.known.view(-1, 1, 1, 1))
+
+
+def moved(points: Float[Tensor, "3 n"], source: Camera, target: Camera) -> Float[Tensor, "3 n"]:
+    """Points from one camera's space to another's."""
+    change = torch.from_numpy(target.viewmat @ source.c2w)
+    return (change[:3, :3] @ points.double() + change[:3, 3:]).float()
+
+
+def _usable(view: KnownLight) -> Bool[Tensor, "h w"]:
+    """Surfaces that reflect, whose brightness the photo tells."""
+    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0, keepdim=False) < 0.1)
+    return plain & view.surfaces.valid
+
+
+def _joined(first: Powers, second: Powers) -> Powers:
+    """Powers of the first, and those that only the second knows, by their ambient's measure."""
+    measure = first.ambient / second.ambient.clamp_min(1e-9)
+    only = second.known & ~first.known
+    lamps = torch.where(only[:, None], second.lamps * measure, first.lamps)
+    return Powers(lamps, first.ambient, first.known | second.known)
+
+
+def _corrections(
+    view: KnownLight, guess: FirstGuess, on: Bool[Tensor, " k"]
+) -> Float[Tensor, "n 3 h w"]:
+    """Natural logs of the true over the guessed shares of lamps and ambient, then of the ratios;
+    0 for what the view does not know."""
+    burning = (on & view.known).view(-1, 1, 1, 1)
+    lit = view.lights * burning
+    rest = (view.photo - lit.sum(0)).clamp_min(0)
+    photo = view.photo + 1e-4
+    shares = torch.log((lit / photo).clamp(0, 1) + SHARE_FLOOR) - torch.log(
+        guess.lamps + SHARE_FLOOR
+    )
+    ambient = torch.log((rest / photo).clamp(0, 1) + SHARE_FLOOR) - torch.log(
+        guess.ambient + SHARE_FLOOR
+    )
+    ratios = torch.log(view.lights / photo + SHARE_FLOOR) - guess.log_ratio
+    known = view.known.view(-1, 1, 1, 1)
+    stacked = torch.cat([shares * burning, ambient[None], ratios * known])
+    return stacked.clamp(-MOST_CORRECTION, MOST_CORRECTION)
+
+
+def _carried(
+    corrections: Float[Tensor, "n 3 h w"],
+    view: KnownLight,
+    usable: Bool[Tensor, "h w"],
+    surfaces: Surfaces,
+    camera: Camera,
+) -> tuple[Float[Tensor, "n 3 y x"], Float[Tensor, "y x"]]:
+    """Sums of a reference's corrections weighted by nearness and facing, and of the weights."""
+    height, width = surfaces.points.shape[1:]
+    step = max(1, math.ceil(max(height, width) / PLACES))
+    here = _places(surfaces.points, step)
+    facing = _places(surfaces.normals, step)
+    rows, columns = here.shape[1:]
+    there = moved(here.flatten(1), camera, view.camera)
+    turned = moved(facing.flatten(1), camera, view.camera) - moved(
+        torch.zeros(3, 1), camera, view.camera
+    )
+    source = max(1, math.ceil(max(usable.shape) / PLACES))
+    taken = _places(usable[None], source)[0].flatten()
+    points = _places(view.surfaces.points, source).flatten(1)[:, taken]
+    normals = _places(view.surfaces.normals, source).flatten(1)[:, taken]
+    values = _places(corrections.flatten(0, 1), source).flatten(1)[:, taken]
+    near = (1 + torch.cdist(there.T, points.T) ** 2 / REACH_M**2) ** -2
+    kernel = near * (turned.T @ normals).clamp_min(0) ** 2
+    sums = torch.cat([values @ kernel.T, kernel.sum(1)[None]]).view(1, -1, rows, columns)
+    sums = fn.interpolate(sums, (height, width), mode="bilinear", align_corners=False)[0]
+    return sums[:-1].view(len(corrections), 3, height, width), sums[-1]
+
+
+def _places(field: Tensor, step: int) -> Tensor:
+    return field[:, step // 2 :: step, step // 2 :: step]
