@@ -80,6 +80,7 @@ def command(
     from luxcore.evaluate.dataset import evaluation_views
     from luxcore.evaluate.public_run import evaluate_public
     from luxcore.evaluate.run import evaluate_models
+    from luxcore.files.atomic import write_json
     from luxcore.settings.evaluate import EvaluateSettings
 
     settings = EvaluateSettings(
@@ -93,6 +94,7 @@ def command(
     else:
         views = evaluation_views(dataset)
         metrics = evaluate_models(views, [], out, settings, seed=seed, **weights)
+    write_json(out / "metrics.json", metrics)
     if as_json:
         import json
 

@@ -14,7 +14,6 @@ from luxcore.evaluate.public_cases import (
 from luxcore.evaluate.run import open_models
 from luxcore.evaluate.single import single_table
 from luxcore.evaluate.table import PAPER_MULTI, PAPER_SINGLE, flat_metrics, write_table
-from luxcore.files.atomic import write_json
 from luxcore.settings.evaluate import EvaluateSettings
 
 NOTE = (
@@ -34,8 +33,8 @@ def evaluate_public(
     sv_weights: Path | None = None,
     mv_weights: Path | None = None,
 ) -> dict[str, float]:
-    """Both tables on the test scenes in `dataset` (shards or folders); writes `out`/tables and
-    `out`/metrics.json and returns the metrics. Photos are `settings.size_px` a side; the paper's
+    """Both tables on the test scenes in `dataset` (shards or folders); writes `out`/tables
+    and returns the metrics. Photos are `settings.size_px` a side; the paper's
     are 512. Raises InputError naming what of the list is missing, before anything is scored.
     """
     listed, known = read_case_list(case_list), read_cameras(cameras)
@@ -49,6 +48,4 @@ def evaluate_public(
     multi = multi_table(groups, models).rows
     write_table(out / "tables", "public_multi", "Table 2, public cases", multi, PAPER_MULTI, [NOTE])
     metrics = flat_metrics("public_single", single) | flat_metrics("public_multi", multi)
-    metrics |= {"public_cases": listed.cases, "public_images": listed.multi_images}
-    write_json(out / "metrics.json", metrics)
-    return metrics
+    return metrics | {"public_cases": listed.cases, "public_images": listed.multi_images}

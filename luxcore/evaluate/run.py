@@ -21,7 +21,6 @@ from luxcore.evaluate.table import (
     flat_metrics,
     write_table,
 )
-from luxcore.files.atomic import write_json
 from luxcore.files.photos import write_png
 from luxcore.models.backends import open_decomposer, open_harmonizer
 from luxcore.models.interface import BackendSettings, Decomposer
@@ -41,15 +40,13 @@ def evaluate_models(
     seed: int = 0,
 ) -> dict[str, float]:
     """Both tables on held-out `views` (stems of rendered views) and `captures` (capture folder,
-    masks folder); writes tables/, pictures/ and metrics.json into `out`, returns the metrics."""
+    masks folder); writes tables/ and pictures/ into `out`, returns the metrics."""
     models = open_models(settings, sv_weights, mv_weights)
     metrics = _evaluate_single(views, models.decomposer, out, settings, seed) if views else {}
     groups = multi_groups(views, captures, settings, seed)
     if groups:
         metrics |= _evaluate_multi(groups, models, out)
-    metrics = {name: round(value, 4) for name, value in metrics.items()}
-    write_json(out / "metrics.json", metrics)
-    return metrics
+    return {name: round(value, 4) for name, value in metrics.items()}
 
 
 def multi_groups(

@@ -119,7 +119,7 @@ PHOTO_SIZE = Knob(
     name="photo resolution in decomposition",
     work="references taken apart",
     choices=tuple(
-        Choice(f"{n} px", {"decompose.options": {"long_side_px": n}}) for n in (96, 160, 256, 320)
+        Choice(f"{n} px", {"decompose.options": {"long_side_px": n}}) for n in (64, 96, 160, 256)
     ),
     error=ERROR,
     why="The model's light is smooth and carried to the photo's own size, so a small side is "
