@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
@@ -140,3 +142,24 @@ def test_references_that_show_nothing_tell_nothing() -> None:
     hints = hints_for(view.surfaces, crop.camera, centres, on, [view])
     features = lamp_features(view.photo, view.masks, on, view.surfaces, centres, hints)
     assert torch.isfinite(features).all()
+
+
+def test_a_channel_that_no_light_has_leaves_everything_finite() -> None:
+    crops = sketched_crops(3, room=2)
+    lamps = len(crops[0].on)
+    on = torch.ones(lamps, dtype=torch.bool)
+    views = []
+    for index, crop in enumerate(crops):
+        known = torch.zeros(lamps, dtype=torch.bool)
+        known[index % lamps] = True
+        view = as_known(crop, known)
+        red = torch.tensor([1.0, 0.5, 0.0]).view(3, 1, 1)
+        lights, photo = view.lights * red, (view.lights * red).sum(0)
+        views.append(replace(view, lights=lights, photo=photo))
+    target = views[0]
+    centres = torch.full((lamps, 3), float("nan"))
+    for references in (views[1:2], views[1:]):
+        hints = hints_for(target.surfaces, target.camera, centres, on, references)
+        assert hints is not None
+        features = lamp_features(target.photo, target.masks, on, target.surfaces, centres, hints)
+        assert torch.isfinite(features).all()

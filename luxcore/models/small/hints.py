@@ -36,6 +36,7 @@ REACH_M = 0.25
 """Distance at which a correction counts a quarter of what it counts on the spot."""
 
 MOST_CORRECTION = 4.0
+MOST_DIFFERENCE = 20.0
 FEWEST_PIXELS = 40
 """A reference that shows less than this of unclipped surfaces tells nothing."""
 
@@ -104,7 +105,8 @@ def _usable(view: KnownLight) -> Bool[Tensor, "h w"]:
 
 def _joined(first: Powers, second: Powers) -> Powers:
     """Powers of the first, and those that only the second knows, by their ambient's measure."""
-    measure = first.ambient / second.ambient.clamp_min(1e-9)
+    # Two views of one room: their paint differs, their ambient light not by more than this.
+    measure = (first.ambient / second.ambient).clamp(1 / MOST_DIFFERENCE, MOST_DIFFERENCE)
     only = second.known & ~first.known
     lamps = torch.where(only[:, None], second.lamps * measure, first.lamps)
     return Powers(lamps, first.ambient, first.known | second.known)

@@ -31,6 +31,7 @@ SHARE_FLOOR = 0.02
 """Added to shares and ratios: a guess of exactly nothing would tell the network too much."""
 
 ALTERNATIONS = 5
+LEAST_POWER = 1e-6
 
 MAX_FIT_PIXELS = 1500
 RELATIVE_FLOOR = 0.02
@@ -163,7 +164,7 @@ def _strengths(
         if powers is None:
             strengths[wanted, channel], ambient[channel] = fitted[:-1], fitted[-1]
         else:
-            strengths[wanted, channel] = fitted[:-1] / fitted[-1]
+            strengths[wanted, channel] = fitted[:-1] / fitted[-1].clamp_min(LEAST_POWER)
     return strengths, ambient
 
 
@@ -189,8 +190,9 @@ def powers_seen(
         sent = (powers[:, :, None] * field * counted).sum(0)
         basis = field * plain / sent.clamp_min(1e-9) * weight
         powers = (seen * weight * basis).sum(2) / (basis**2).sum(2).clamp_min(1e-9)
-    # A little of everything stays, as in the fit.
-    powers = powers + 1e-3 * (powers[-1:] + 1e-6)
+    # A little of everything stays, as in the fit, also in a channel that the photo lacks.
+    strongest = powers.amax(0).clamp_min(1e3 * LEAST_POWER)
+    powers = torch.maximum(powers, 1e-3 * strongest)
     return Powers(powers[:-1], powers[-1], known)
 
 
