@@ -99,7 +99,7 @@ def moved(points: Float[Tensor, "3 n"], source: Camera, target: Camera) -> Float
 
 def _usable(view: KnownLight) -> Bool[Tensor, "h w"]:
     """Surfaces that reflect, whose brightness the photo tells."""
-    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0, keepdim=False) < 0.1)
+    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0) < 0.1)
     return plain & view.surfaces.valid
 
 
