@@ -44,31 +44,38 @@ def decompose_photo(
     burning = burning_lamps(exposed, masks) if on is None else on
     light = decomposer.decompose(exposed, masks, burning, geometry, seed)
     check_finite(light, decomposer.name)
-    light = replace(light, scale=solved_scale(exposed, light, burning))
-    return PhotoLight(scaled_by(light, 1 / exposure), burning, recomposition_db(exposed, light))
+    shown = np.asarray(agx(exposed))
+    scale, recomposition = _best_scale(exposed, shown, light, burning)
+    light = scaled_by(replace(light, scale=scale), 1 / exposure)
+    return PhotoLight(light, burning, recomposition)
 
 
-def solved_scale(
-    exposed: Float[np.ndarray, "h w 3"], light: Decomposition, on: Bool[np.ndarray, " k"]
-) -> Float[np.ndarray, "k 3"]:
-    """RGB factors c of the burning lamps that best rebuild the photo; 0 for the others.
+def _best_scale(
+    exposed: Float[np.ndarray, "h w 3"],
+    shown: Float[np.ndarray, "h w 3"],
+    light: Decomposition,
+    on: Bool[np.ndarray, " k"],
+) -> tuple[Float[np.ndarray, "k 3"], float]:
+    """RGB factors c of the burning lamps that best rebuild the photo, 0 for the others, and how
+    well they do in dB. `shown` is the photo through AgX.
 
     A model whose lights add up already (the small one) has factors of its own; those stay when
     they rebuild the photo at least as well as the solved ones.
     """
     from luxcore.light.scale_factors import solve
 
-    if not on.any():
-        return np.zeros((len(on), 3), np.float32)
     solved = np.zeros((len(on), 3), np.float32)
+    if not on.any():
+        return solved, _recomposition_db(shown, replace(light, scale=solved))
     solved[on] = solve(exposed, light.ambient, light.olat[on])
-    own = recomposition_db(exposed, light)
-    return solved if recomposition_db(exposed, replace(light, scale=solved)) > own else light.scale
+    by_solved = _recomposition_db(shown, replace(light, scale=solved))
+    own = _recomposition_db(shown, light)
+    return (solved, by_solved) if by_solved > own else (light.scale, own)
 
 
-def recomposition_db(exposed: Float[np.ndarray, "h w 3"], light: Decomposition) -> float:
-    """PSNR in dB, at most 99, of the recomposed photo against the photo, both through AgX."""
-    error = float(np.mean((agx(light.recomposed()) - agx(exposed)) ** 2, dtype=np.float64))
+def _recomposition_db(shown: Float[np.ndarray, "h w 3"], light: Decomposition) -> float:
+    """PSNR in dB, at most 99, of the recomposed photo through AgX against the photo as shown."""
+    error = float(np.mean((agx(light.recomposed()) - shown) ** 2, dtype=np.float64))
     return min(99.0, -10 * math.log10(max(error, 1e-10)))
 
 
