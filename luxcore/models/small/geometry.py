@@ -15,6 +15,7 @@ from torch import Tensor
 from luxcore.models.small.features import photo_features
 from luxcore.models.small.network import UNet
 from luxcore.models.small.surfaces import Surfaces, pinhole_rays
+from luxcore.models.small.transport import FARTHEST_M
 
 PHOTO_CHANNELS = 6
 GEOMETRY_OUTPUTS = 5
@@ -23,9 +24,6 @@ GEOMETRY_OUTPUTS = 5
 TYPICAL_DEPTH_M = 3.0
 TYPICAL_FOCAL = 0.87
 """In long sides of the photo: 60 degrees."""
-
-FARTHEST_M = 30.0
-"""Beyond this is outdoors, seen through a window: no part of the room, and not learned."""
 
 ESTIMATED_TRUST = 0.5
 
@@ -90,7 +88,7 @@ def geometry_loss(
 
 
 def indoors(truth: Surfaces) -> Bool[Tensor, "h w"]:
-    """Where a surface of the room is known."""
+    """Where a surface of the room is known; what is outdoors is not learned."""
     return truth.valid & (truth.points[2] < FARTHEST_M)
 
 

@@ -28,6 +28,7 @@ from luxcore.models.small.prior import (
     unit_irradiance,
 )
 from luxcore.models.small.surfaces import Surfaces
+from luxcore.models.small.transport import every
 
 PLACES = 24
 """Corrections are carried between at most this many places a side."""
@@ -143,24 +144,20 @@ def _carried(
     """Sums of a reference's corrections weighted by nearness and facing, and of the weights."""
     height, width = surfaces.points.shape[1:]
     step = max(1, math.ceil(max(height, width) / PLACES))
-    here = _places(surfaces.points, step)
-    facing = _places(surfaces.normals, step)
+    here = every(surfaces.points, step)
+    facing = every(surfaces.normals, step)
     rows, columns = here.shape[1:]
     there = moved(here.flatten(1), camera, view.camera)
     turned = moved(facing.flatten(1), camera, view.camera) - moved(
         torch.zeros(3, 1), camera, view.camera
     )
     source = max(1, math.ceil(max(usable.shape) / PLACES))
-    taken = _places(usable[None], source)[0].flatten()
-    points = _places(view.surfaces.points, source).flatten(1)[:, taken]
-    normals = _places(view.surfaces.normals, source).flatten(1)[:, taken]
-    values = _places(corrections.flatten(0, 1), source).flatten(1)[:, taken]
+    taken = every(usable[None].float(), source).bool()[0].flatten()
+    points = every(view.surfaces.points, source).flatten(1)[:, taken]
+    normals = every(view.surfaces.normals, source).flatten(1)[:, taken]
+    values = every(corrections.flatten(0, 1), source).flatten(1)[:, taken]
     near = (1 + torch.cdist(there.T, points.T) ** 2 / REACH_M**2) ** -2
     kernel = near * (turned.T @ normals).clamp_min(0) ** 2
     sums = torch.cat([values @ kernel.T, kernel.sum(1)[None]]).view(1, -1, rows, columns)
     sums = fn.interpolate(sums, (height, width), mode="bilinear", align_corners=False)[0]
     return sums[:-1].view(len(corrections), 3, height, width), sums[-1]
-
-
-def _places(field: Tensor, step: int) -> Tensor:
-    return field[:, step // 2 :: step, step // 2 :: step]

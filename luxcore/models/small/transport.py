@@ -117,11 +117,16 @@ def bounce_of(surfaces: Surfaces) -> Bounce:
     normal = torch.stack([_cells(axis * weight) for axis in surfaces.normals])
     normal = normal / normal.norm(dim=0).clamp_min(1e-6)
     step = max(1, math.ceil(max(weight.shape) / RECEIVERS))
-    shown = [field[:, step // 2 :: step, step // 2 :: step] for field in (points, surfaces.normals)]
+    shown = [every(field, step) for field in (points, surfaces.normals)]
     area = area * (weight.numel() / CELLS**2)
     gather = _form_factors(shown[0].flatten(1), shown[1].flatten(1), middle, normal, area)
     exchange = _form_factors(middle, normal, middle, normal, area)
     return Bounce(gather, exchange, weight, (shown[0].shape[1], shown[0].shape[2]))
+
+
+def every(field: Float[Tensor, "c h w"], step: int) -> Float[Tensor, "c y x"]:
+    """Every `step`-th pixel both ways, from the middle of the first step on."""
+    return field[:, step // 2 :: step, step // 2 :: step]
 
 
 def _cells(field: Float[Tensor, "h w"]) -> Float[Tensor, " p"]:
