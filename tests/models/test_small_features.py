@@ -7,7 +7,7 @@ import torch
 
 from luxcore.cameras import Camera, look_at
 from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS, lamp_features
-from luxcore.models.small.hints import KnownLight
+from luxcore.models.small.hints import KnownLight, references_of
 from luxcore.models.small.multiview import (
     TargetView,
     correspondence,
@@ -128,9 +128,9 @@ def test_a_reference_in_the_same_place_hands_its_fractions_over_unchanged() -> N
     on = torch.tensor([True, True])
     lights = torch.stack([0.25 * (photo + 0.02), 0.5 * (photo + 0.02)])
     known = torch.tensor([True, False])
-    reference = KnownLight(place, photo, masks, surfaces, lights, known)
+    reference = KnownLight(place, photo, masks, on, surfaces, lights, known)
     features, warped = multiview_features(
-        TargetView(photo, masks, on, surfaces), place, [reference]
+        TargetView(photo, masks, on, surfaces), place, references_of([reference], 2)
     )
     assert features.shape == (2, MV_CHANNELS, 32, 32)
     torch.testing.assert_close(warped.ratio[0], torch.full((3, 32, 32), 0.25))

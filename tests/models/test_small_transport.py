@@ -10,7 +10,7 @@ import torch
 from luxcore.cameras import look_at
 from luxcore.data.crops import LitCrop
 from luxcore.models.small.features import lamp_features
-from luxcore.models.small.hints import KnownLight, hints_for
+from luxcore.models.small.hints import KnownLight, hints_for, references_of
 from luxcore.models.small.prior import first_guess, powers_seen, unit_irradiance
 from luxcore.models.small.surfaces import Surfaces, lamp_centres, surfaces_of
 from luxcore.models.small.transport import BEYOND, bounce_of, visibility
@@ -108,7 +108,8 @@ def test_references_make_the_first_guess_of_another_view_better() -> None:
         centres, placed = lamp_centres(views[0].masks, views[0].surfaces, views[0].photo, on)
         centres[~placed] = float("nan")
         field = unit_irradiance(views[0].masks, views[0].surfaces, centres, placed).total
-        hints = hints_for(views[0].surfaces, here.camera, centres, on, [views[1]])
+        told_by = references_of([views[1]], len(on))
+        hints = hints_for(views[0].surfaces, here.camera, told_by)
         truth = views[0].lights / (views[0].photo + 1e-4)
         wanted = on & views[1].known & placed
         for given, errors in ((None, plain), (hints, told)):
@@ -126,7 +127,7 @@ def as_known(crop: LitCrop, known: torch.Tensor) -> KnownLight:
     lights = torch.from_numpy(crop.lights).movedim(-1, 1).float()
     masks = torch.from_numpy(crop.masks).float()
     surfaces = surfaces_of(crop.depth_m, crop.normal, crop.camera)
-    return KnownLight(crop.camera, photo, masks, surfaces, lights, known)
+    return KnownLight(crop.camera, photo, masks, torch.from_numpy(crop.on), surfaces, lights, known)
 
 
 def test_references_that_show_nothing_tell_nothing() -> None:
@@ -134,12 +135,11 @@ def test_references_that_show_nothing_tell_nothing() -> None:
     view = as_known(crop, torch.ones(len(crop.on), dtype=torch.bool))
     on = torch.from_numpy(crop.on)
     centres = torch.full((len(on), 3), float("nan"))
-    white = KnownLight(
-        view.camera, view.photo * 0 + 16, view.masks, view.surfaces, view.lights, view.known
-    )
-    assert hints_for(view.surfaces, crop.camera, centres, on, [white]) is None
-    assert hints_for(None, crop.camera, centres, on, [view]) is None
-    hints = hints_for(view.surfaces, crop.camera, centres, on, [view])
+    white = references_of([replace(view, photo=view.photo * 0 + 16)], len(on))
+    assert hints_for(view.surfaces, crop.camera, white) is None
+    itself = references_of([view], len(on))
+    assert hints_for(None, crop.camera, itself) is None
+    hints = hints_for(view.surfaces, crop.camera, itself)
     features = lamp_features(view.photo, view.masks, on, view.surfaces, centres, hints)
     assert torch.isfinite(features).all()
 
@@ -155,11 +155,12 @@ def test_a_channel_that_no_light_has_leaves_everything_finite() -> None:
         view = as_known(crop, known)
         red = torch.tensor([1.0, 0.5, 0.0]).view(3, 1, 1)
         lights, photo = view.lights * red, (view.lights * red).sum(0)
-        views.append(replace(view, lights=lights, photo=photo))
+        views.append(replace(view, lights=lights, photo=photo, on=on))
     target = views[0]
     centres = torch.full((lamps, 3), float("nan"))
     for references in (views[1:2], views[1:]):
-        hints = hints_for(target.surfaces, target.camera, centres, on, references)
+        told_by = references_of(references, lamps)
+        hints = hints_for(target.surfaces, target.camera, told_by)
         assert hints is not None
         features = lamp_features(target.photo, target.masks, on, target.surfaces, centres, hints)
         assert torch.isfinite(features).all()

@@ -15,7 +15,7 @@ from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
-from luxcore.models.small.hints import KnownLight
+from luxcore.models.small.hints import KnownLight, references_of
 from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import CropPool
@@ -88,7 +88,8 @@ def group_example(
     example = to_example(target, geometry=True, keep=keep)
     lights = [_known_light(view, keep, rng) for view in references]
     view = TargetView(example.photo, example.masks, example.on, example.surfaces)
-    features, warped = multiview_features(view, target.camera, lights)
+    told = references_of(lights, len(example.on))
+    features, warped = multiview_features(view, target.camera, told)
     return features, replace(example, warped=warped)
 
 
@@ -108,7 +109,9 @@ def _known_light(view: LitCrop, keep: np.ndarray, rng: Generator | None) -> Know
         light = light * torch.stack(noise)[:, None].exp()
     assert example.surfaces is not None
     seen = torch.from_numpy(view.masks[keep].any((1, 2)))
-    return KnownLight(view.camera, example.photo, example.masks, example.surfaces, light, seen)
+    return KnownLight(
+        view.camera, example.photo, example.masks, example.on, example.surfaces, light, seen
+    )
 
 
 def _bent(view: LitCrop, rng: Generator) -> LitCrop:

@@ -111,9 +111,11 @@ class _Fit:
         for group in self.optimizer.param_groups:
             group["lr"] = self.settings.rate * schedule(self.step, self.settings)
         features = torch.cat([f for f, _ in batch]).contiguous(memory_format=torch.channels_last)
+        counts = [len(f) for f, _ in batch]
+        photo = torch.repeat_interleave(torch.arange(len(counts)), torch.tensor(counts))
         with torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bf16):
-            outputs = self.net(features)
-        parts = outputs.float().split([len(f) for f, _ in batch])
+            outputs = self.net(features, photo)
+        parts = outputs.float().split(counts)
         losses = [self.loss_of(p, example) for p, (_, example) in zip(parts, batch, strict=True)]
         loss = torch.stack(losses).mean()
         if not bool(torch.isfinite(loss)):

@@ -27,7 +27,7 @@ from luxcore.models.small.prior import (
     powers_seen,
     unit_irradiance,
 )
-from luxcore.models.small.surfaces import Surfaces
+from luxcore.models.small.surfaces import Surfaces, lamp_centres
 from luxcore.models.small.transport import every
 
 PLACES = 24
@@ -49,46 +49,75 @@ class KnownLight:
     camera: Camera
     photo: Float[Tensor, "3 h w"]
     masks: Float[Tensor, "k h w"]
+    on: Bool[Tensor, " k"]
     surfaces: Surfaces
     lights: Float[Tensor, "k 3 h w"]
     known: Bool[Tensor, " k"]
 
 
-def hints_for(
-    surfaces: Surfaces | None,
-    camera: Camera,
-    lamp_points: Float[Tensor, "k 3"],
-    on: Bool[Tensor, " k"],
-    references: Sequence[KnownLight],
-) -> Hints | None:
-    """Powers and corrections for a view with these `surfaces` and lamp centres (in its camera's
-    space; not finite where nobody knows); None where nothing can be told."""
-    if surfaces is None or not references or not len(on):
+@dataclass(frozen=True)
+class Lesson:
+    """What a reference tells: powers, and by how much the first guess with them is wrong (see
+    `_corrections`) on its `usable` surfaces."""
+
+    view: KnownLight
+    usable: Bool[Tensor, "h w"]
+    powers: Powers
+    corrections: Float[Tensor, "n 3 h w"]
+
+
+@dataclass(frozen=True)
+class References:
+    """The references of a pass. `centres` are of lamps, in the first one's camera space, metres;
+    not finite for lamps that none of them shows with depth. Without `light` only these places are
+    told: an ablation."""
+
+    views: tuple[KnownLight, ...]
+    centres: Float[Tensor, "k 3"]
+    lessons: tuple[Lesson, ...]
+    light: bool
+
+
+def references_of(views: Sequence[KnownLight], lamps: int, *, light: bool = True) -> References:
+    """All that does not depend on the view that is asked about."""
+    centres = torch.full((lamps, 3), float("nan"))
+    for view in views:
+        seen, valid = lamp_centres(view.masks, view.surfaces, view.photo, view.on)
+        here = moved(seen.T, view.camera, views[0].camera).T
+        take = valid & ~centres.isfinite().all(1)
+        centres[take] = here[take]
+    lessons = [_lesson(view, views[0].camera, centres) for view in views if light and lamps]
+    told = tuple(lesson for lesson in lessons if lesson is not None)
+    return References(tuple(views), centres, told, light)
+
+
+def _lesson(view: KnownLight, first: Camera, centres: Float[Tensor, "k 3"]) -> Lesson | None:
+    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0) < 0.1)
+    usable = plain & view.surfaces.valid
+    if int(usable.sum()) < FEWEST_PIXELS:
         return None
-    powers: Powers | None = None
-    told = []
-    for reference in references:
-        usable = _usable(reference)
-        if int(usable.sum()) < FEWEST_PIXELS:
-            continue
-        points = moved(lamp_points.T, camera, reference.camera).T
-        centred = points.isfinite().all(1)
-        field = unit_irradiance(reference.masks, reference.surfaces, points, centred).total
-        seen = powers_seen(reference.photo, reference.lights, field, on, reference.known, usable)
-        powers = seen if powers is None else _joined(powers, seen)
-        told.append((reference, field, seen, usable))
-    if powers is None:
+    points = moved(centres.T, first, view.camera).T
+    field = unit_irradiance(view.masks, view.surfaces, points, points.isfinite().all(1)).total
+    powers = powers_seen(view.photo, view.lights, field, view.on, view.known, usable)
+    guess = first_guess(view.photo, view.masks, field, view.on, Hints(powers))
+    return Lesson(view, usable, powers, _corrections(view, guess))
+
+
+def hints_for(surfaces: Surfaces | None, camera: Camera, references: References) -> Hints | None:
+    """Powers and corrections for a view with these `surfaces`; None where nothing can be told."""
+    if surfaces is None or not references.lessons:
         return None
+    lamps = len(references.centres)
+    powers = references.lessons[0].powers
+    for lesson in references.lessons[1:]:
+        powers = _joined(powers, lesson.powers)
     height, width = surfaces.points.shape[1:]
-    weighted, weight = torch.zeros(2 * len(on) + 1, 3, height, width), torch.zeros(height, width)
-    for reference, field, seen, usable in told:
-        guess = first_guess(reference.photo, reference.masks, field, on, Hints(seen))
-        carried, share = _carried(
-            _corrections(reference, guess, on), reference, usable, surfaces, camera
-        )
+    weighted, weight = torch.zeros(2 * lamps + 1, 3, height, width), torch.zeros(height, width)
+    for lesson in references.lessons:
+        carried, share = _carried(lesson, surfaces, camera)
         weighted, weight = weighted + carried, weight + share
     correction = weighted / (weight + 1e-2)
-    shares, log_ratio = correction[: len(on) + 1], correction[len(on) + 1 :]
+    shares, log_ratio = correction[: lamps + 1], correction[lamps + 1 :]
     return Hints(powers, shares, log_ratio * powers.known.view(-1, 1, 1, 1))
 
 
@@ -96,12 +125,6 @@ def moved(points: Float[Tensor, "3 n"], source: Camera, target: Camera) -> Float
     """Points from one camera's space to another's."""
     change = torch.from_numpy(target.viewmat @ source.c2w)
     return (change[:3, :3] @ points.double() + change[:3, 3:]).float()
-
-
-def _usable(view: KnownLight) -> Bool[Tensor, "h w"]:
-    """Surfaces that reflect, whose brightness the photo tells."""
-    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0) < 0.1)
-    return plain & view.surfaces.valid
 
 
 def _joined(first: Powers, second: Powers) -> Powers:
@@ -113,12 +136,10 @@ def _joined(first: Powers, second: Powers) -> Powers:
     return Powers(lamps, first.ambient, first.known | second.known)
 
 
-def _corrections(
-    view: KnownLight, guess: FirstGuess, on: Bool[Tensor, " k"]
-) -> Float[Tensor, "n 3 h w"]:
+def _corrections(view: KnownLight, guess: FirstGuess) -> Float[Tensor, "n 3 h w"]:
     """Natural logs of the true over the guessed shares of lamps and ambient, then of the ratios;
     0 for what the view does not know."""
-    burning = (on & view.known).view(-1, 1, 1, 1)
+    burning = (view.on & view.known).view(-1, 1, 1, 1)
     lit = view.lights * burning
     rest = (view.photo - lit.sum(0)).clamp_min(0)
     photo = view.photo + 1e-4
@@ -135,13 +156,10 @@ def _corrections(
 
 
 def _carried(
-    corrections: Float[Tensor, "n 3 h w"],
-    view: KnownLight,
-    usable: Bool[Tensor, "h w"],
-    surfaces: Surfaces,
-    camera: Camera,
+    lesson: Lesson, surfaces: Surfaces, camera: Camera
 ) -> tuple[Float[Tensor, "n 3 y x"], Float[Tensor, "y x"]]:
     """Sums of a reference's corrections weighted by nearness and facing, and of the weights."""
+    view, usable, corrections = lesson.view, lesson.usable, lesson.corrections
     height, width = surfaces.points.shape[1:]
     step = max(1, math.ceil(max(height, width) / PLACES))
     here = every(surfaces.points, step)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -20,7 +20,8 @@ from luxcore.models.small.grid import (
     photo_to_grid,
     to_grid,
 )
-from luxcore.models.small.hints import KnownLight
+from luxcore.models.small.heads import WarpedLight
+from luxcore.models.small.hints import KnownLight, References, references_of
 from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import chw
@@ -51,22 +52,22 @@ class SmallHarmonizer:
                 f"{len(views)} and {len(references)} references."
             )
         known = [self._known_light(reference) for reference in references]
-        return [self._decompose(view, [k for k in known if k is not None]) for view in views]
+        lamps = len(views[0].on) if views else 0
+        told = references_of([k for k in known if k is not None], lamps, light=self.warp)
+        return [self._decompose(view, told) for view in views]
 
-    def _decompose(self, view: View, references: Sequence[KnownLight]) -> Decomposition:
-        told = np.array(
-            [bool(any(r.known[k] for r in references)) for k in range(len(view.on))], bool
-        )
-        heard_of = view.masks.any((1, 2)) | told
-        if not heard_of.all():
-            part = self._decompose(
-                _with_lamps(view, heard_of), [_known_lamps(r, heard_of) for r in references]
-            )
-            return with_unseen(part, heard_of)
+    def _decompose(self, view: View, references: References) -> Decomposition:
         target, camera = self._target(view)
-        features, warped = multiview_features(target, camera, references, warp=self.warp)
-        fields = run_network(self.net, features, target.on, warped)
-        return finish(fields, target.photo, view.image_linear, view.masks, target.on)
+        features, warped = multiview_features(target, camera, references)
+        heard_of = view.masks.any((1, 2))
+        for reference in references.views:
+            heard_of |= reference.known.numpy()
+        index = torch.from_numpy(heard_of)
+        on = target.on[index]
+        warped = WarpedLight(warped.ratio[index], warped.known[index])
+        fields = run_network(self.net, features[index], on, warped)
+        part = finish(fields, target.photo, view.image_linear, view.masks[heard_of], on)
+        return part if heard_of.all() else with_unseen(part, heard_of)
 
     def _known_light(self, reference: Reference) -> KnownLight | None:
         """A reference on the grid; None without geometry, since nothing can be warped then."""
@@ -82,7 +83,13 @@ class SmallHarmonizer:
         ]
         known = torch.from_numpy(reference.known)
         return KnownLight(
-            camera, target.photo, target.masks, target.surfaces, _stack(lights, target), known
+            camera,
+            target.photo,
+            target.masks,
+            target.on,
+            target.surfaces,
+            _stack(lights, target),
+            known,
         )
 
     def _target(self, view: View) -> tuple[TargetView, Camera]:
@@ -96,17 +103,6 @@ class SmallHarmonizer:
         photo, masks = photo_to_grid(view.image_linear, size), masks_to_grid(view.masks, size)
         on: Bool[Tensor, " k"] = torch.from_numpy(view.on)
         return TargetView(photo, masks, on, surfaces), camera
-
-
-def _with_lamps(view: View, kept: Bool[np.ndarray, " k"]) -> View:
-    return replace(view, masks=view.masks[kept], on=view.on[kept])
-
-
-def _known_lamps(light: KnownLight, kept: Bool[np.ndarray, " k"]) -> KnownLight:
-    index = torch.from_numpy(kept)
-    return replace(
-        light, masks=light.masks[index], lights=light.lights[index], known=light.known[index]
-    )
 
 
 def _stack(lights: list[Tensor], target: TargetView) -> Float[Tensor, "k 3 h w"]:

@@ -6,7 +6,6 @@ ratios of diffuse surfaces do not depend on the view and carry no texture.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -17,8 +16,14 @@ from torch import Tensor
 from luxcore.cameras import Camera
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.heads import RATIO_FLOOR, WarpedLight
-from luxcore.models.small.hints import KnownLight, hints_for, moved
-from luxcore.models.small.surfaces import Surfaces, lamp_centres, pinhole_of, pinhole_rays
+from luxcore.models.small.hints import References, hints_for, moved
+from luxcore.models.small.surfaces import (
+    Surfaces,
+    lamp_centres,
+    picture_places,
+    pinhole_of,
+    pinhole_rays,
+)
 
 DEPTH_TOLERANCE = 0.05
 """Relative difference of depth within which two views see the same surface."""
@@ -35,38 +40,30 @@ class TargetView:
 
 
 def multiview_features(
-    target: TargetView, camera: Camera, references: Sequence[KnownLight], *, warp: bool = True
+    target: TargetView, camera: Camera, references: References
 ) -> tuple[Float[Tensor, "k c h w"], WarpedLight]:
     """The MV_CHANNELS channels of every lamp (the single-view ones, warped light, Plücker rays),
-    and the warped light itself.
-
-    `warp=False` leaves out all that the references' light tells: an ablation.
-    """
+    and the warped light itself."""
     k = len(target.on)
     centres = lamp_points(target, camera, references)
-    lit = references if warp else ()
-    hints = hints_for(target.surfaces, camera, centres, target.on, lit)
+    hints = hints_for(target.surfaces, camera, references)
     single = lamp_features(target.photo, target.masks, target.on, target.surfaces, centres, hints)
-    ratio, weight = _warped_ratio(target, camera, lit)
+    ratio, weight = _warped_ratio(target, camera, references)
     on = target.on.view(k, 1, 1, 1)
     fraction = ratio.clamp(0, 1.5) * on
     log_ratio = torch.log(ratio + 1e-3) / 4 * ~on * (weight > 0)
-    rays = pluecker(camera, references[0].camera if references else camera).expand(k, -1, -1, -1)
+    views = references.views
+    rays = pluecker(camera, views[0].camera if views else camera).expand(k, -1, -1, -1)
     warped = WarpedLight(ratio, (weight > 0).to(ratio))
     return torch.cat([single, fraction, log_ratio, warped.known, rays], dim=1), warped
 
 
-def lamp_points(
-    target: TargetView, camera: Camera, references: Sequence[KnownLight]
-) -> Float[Tensor, "k 3"]:
-    """Lamp centres in the target's camera space: from the first reference that sees the lamp with
-    depth, else from the target's own mask; not finite where nobody sees it."""
-    points = torch.full((len(target.on), 3), float("nan"))
-    for reference in references:
-        seen, valid = lamp_centres(reference.masks, reference.surfaces, reference.photo, target.on)
-        here = moved(seen.T, reference.camera, camera).T
-        take = valid & ~points.isfinite().all(1)
-        points[take] = here[take]
+def lamp_points(target: TargetView, camera: Camera, references: References) -> Float[Tensor, "k 3"]:
+    """Lamp centres in the target's camera space: where references saw them, else from the target's
+    own mask; not finite where nobody sees a lamp with depth."""
+    points = references.centres.clone()
+    if references.views:
+        points = moved(points.T, references.views[0].camera, camera).T
     if target.surfaces is not None:
         own, valid = lamp_centres(target.masks, target.surfaces, target.photo, target.on)
         take = valid & ~points.isfinite().all(1)
@@ -90,16 +87,16 @@ def pluecker(camera: Camera, base: Camera) -> Float[Tensor, "6 h w"]:
 
 
 def _warped_ratio(
-    target: TargetView, camera: Camera, references: Sequence[KnownLight]
+    target: TargetView, camera: Camera, references: References
 ) -> tuple[Float[Tensor, "k 3 h w"], Float[Tensor, "k 1 h w"]]:
     """Mean over references of light/photo at the place each target pixel shows, and its weight."""
     k, h, w = target.masks.shape
     total, weight = torch.zeros(k, 3, h, w), torch.zeros(k, 1, h, w)
-    for reference in references if target.surfaces is not None else ():
-        assert target.surfaces is not None
-        grid, visible = correspondence(
-            target.surfaces, camera, reference.surfaces, reference.camera
-        )
+    surfaces = target.surfaces
+    if surfaces is None or not references.light:
+        return total, weight
+    for reference in references.views:
+        grid, visible = correspondence(surfaces, camera, reference.surfaces, reference.camera)
         ratio = reference.lights / (reference.photo + RATIO_FLOOR)
         here = fn.grid_sample(ratio, grid.expand(k, -1, -1, -1), align_corners=False)
         share = visible * reference.known.view(k, 1, 1, 1)
@@ -113,11 +110,10 @@ def correspondence(
     """Where each target pixel's surface lies in the source picture (grid_sample coordinates), and
     a weight: 0 where the source does not see it, higher the closer the source stands."""
     place = moved(target.points.flatten(1), target_camera, source_camera)
-    z = place[2].clamp_min(1e-3)
-    u = (source_camera.fx * place[0] / z + source_camera.cx) / source_camera.width
-    v = (source_camera.fy * place[1] / z + source_camera.cy) / source_camera.height
     shape = target.points.shape[1:]
-    grid = torch.stack([u * 2 - 1, v * 2 - 1], -1).reshape(1, *shape, 2)
+    z = place[2].clamp_min(1e-3)
+    pinhole, size = pinhole_of(source_camera), (source_camera.height, source_camera.width)
+    grid = picture_places(place, pinhole, *size).reshape(1, *shape, 2)
     there = fn.grid_sample(source.points[None, 2:], grid, mode="nearest", align_corners=False)[0, 0]
     z = z.reshape(shape)
     inside = (grid[0].abs() <= 1).all(-1) & (place[2].reshape(shape) > 1e-3)

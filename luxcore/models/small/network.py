@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import torch
 import torch.nn.functional as fn
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from luxcore.models.small.features import AMBIENT_SHARE, LAMP_SHARE, LOG_RATIO, LOG_RATIO_SCALE
@@ -39,6 +39,8 @@ class NetworkShape:
     """Finer grids, from the coarsest up, whose places see each other as well."""
     overall: bool = False
     """Whether each output gets one number for the whole photo besides: how strong a lamp is."""
+    together: int = 0
+    """Grids, from the coarsest up, on which the lamps of a photo see each other."""
 
     @property
     def stride(self) -> int:
@@ -73,33 +75,45 @@ class UNet(nn.Module):
         self.across = nn.ModuleList(
             Attention(fine, shape.heads) for fine, _ in pairs[: shape.attending]
         )
+        self.together = nn.ModuleList(
+            AmongLamps(width, shape.heads) for width in widths[::-1][: shape.together]
+        )
         self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
         self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
         # Zero corrections are the first guess itself: a sane start for every lamp.
         for parameter in self.head.parameters():
             nn.init.zeros_(parameter)
 
-    def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o h w"]:
+    def forward(
+        self, features: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
+    ) -> Float[Tensor, "b o h w"]:
+        """`photo` numbers the photo that each input is of; None: all are lamps of one."""
         x = self.stem(fn.pixel_unshuffle(features, self.shape.unshuffle))
         skips: list[Tensor] = []
         for level, block in enumerate(self.down):
             x = block(fn.avg_pool2d(x, 2) if level else x)
             skips.append(x)
-        x = self.middle(x)
+        x = self._among_lamps(self.middle(x), 0, photo)
         overall = None if self.overall is None else self.overall(x)
         for level, (block, skip) in enumerate(zip(self.up, skips[-2::-1], strict=True)):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
             if level < len(self.across):
                 x = self.across[level](x)
+            x = self._among_lamps(x, level + 1, photo)
         outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
         return outputs if overall is None else outputs + overall
+
+    def _among_lamps(self, x: Tensor, grid: int, photo: Tensor | None) -> Tensor:
+        return self.together[grid](x, photo) if grid < len(self.together) else x
 
 
 class LampNet(UNet):
     """Features of one lamp to its four heads: corrections of the first guess."""
 
-    def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o h w"]:
-        outputs = super().forward(features)
+    def forward(
+        self, features: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
+    ) -> Float[Tensor, "b o h w"]:
+        outputs = super().forward(features, photo)
         return torch.cat([outputs[:, :9] + guessed_outputs(features), outputs[:, 9:]], dim=1)
 
 
@@ -161,6 +175,30 @@ class Attention(nn.Module):
         q, k, v = tokens.transpose(-1, -2).unbind(1)
         mixed = fn.scaled_dot_product_attention(q, k, v)
         return x + self.out(mixed.transpose(-1, -2).reshape(b, c, h, w))
+
+
+class AmongLamps(nn.Module):
+    """At every place the lamps of a photo see each other: one lamp's share is what the others
+    leave."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.norm = nn.GroupNorm(8, width)
+        self.qkv = nn.Conv2d(width, 3 * width, 1)
+        self.out = nn.Conv2d(width, width, 1)
+        for parameter in self.out.parameters():
+            nn.init.zeros_(parameter)
+
+    def forward(
+        self, x: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None
+    ) -> Float[Tensor, "b c h w"]:
+        b, c, h, w = x.shape
+        tokens = self.qkv(self.norm(x)).reshape(b, 3, self.heads, c // self.heads, h * w)
+        q, k, v = tokens.permute(1, 4, 2, 0, 3)
+        same = None if photo is None else photo[:, None] == photo[None]
+        mixed = fn.scaled_dot_product_attention(q, k, v, attn_mask=same)
+        return x + self.out(mixed.permute(2, 1, 3, 0).reshape(b, c, h, w))
 
 
 Net = TypeVar("Net", bound=nn.Module)

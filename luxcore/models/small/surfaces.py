@@ -49,6 +49,19 @@ def pinhole_rays(pinhole: Pinhole, height: int, width: int) -> Float[Tensor, "3 
     return torch.stack([grid_x, grid_y, torch.ones_like(grid_x)]).float()
 
 
+def picture_places(
+    points: Float[Tensor, "3 ..."], pinhole: Pinhole, height: int, width: int
+) -> Float[Tensor, "... 2"]:
+    """Where camera-space points are seen, as `grid_sample` counts: -1 to 1 over the picture.
+
+    Points behind the camera are somewhere: ask for their z first.
+    """
+    fx, fy, cx, cy = pinhole
+    x, y, z = points[0], points[1], points[2].clamp_min(1e-3)
+    u, v = (fx * x / z + cx) / width, (fy * y / z + cy) / height
+    return torch.stack([2 * u - 1, 2 * v - 1], dim=-1)
+
+
 def surfaces_of(
     depth_m: Float[np.ndarray, "h w"], normal: Float[np.ndarray, "h w 3"], camera: Camera
 ) -> Surfaces:

@@ -27,14 +27,14 @@ from luxcore.models.small.batches import (
     single_features,
 )
 from luxcore.models.small.examples import Example, to_example
-from luxcore.models.small.features import MV_CHANNELS, SV_CHANNELS
 from luxcore.models.small.fit import Batches, FitResult, FitSettings, Validate, fit
-from luxcore.models.small.network import MV_OUTPUTS, SV_OUTPUTS, LampNet, NetworkShape, UNet
+from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.pictures import validation_sheet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.scores import lamp_scores, mean_psnr
 from luxcore.models.small.sketch import SketchRooms
 from luxcore.models.small.weights import (
+    CHANNELS,
     load_network,
     save_weights,
     shipped_estimator,
@@ -45,8 +45,9 @@ from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
 WIDTHS = (40, 80, 160, 224)
 SHAPES = {
-    "sv": NetworkShape(SV_CHANNELS, SV_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True),
-    "mv": NetworkShape(MV_CHANNELS, MV_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True),
+    kind: NetworkShape(*channels, WIDTHS, middle=2, attending=1, overall=True, together=3)
+    for kind, channels in CHANNELS.items()
+    if kind != "geometry"
 }
 SKETCH_ROOMS = 100_000
 

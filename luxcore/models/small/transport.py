@@ -14,7 +14,7 @@ import torch.nn.functional as fn
 from jaxtyping import Float
 from torch import Tensor
 
-from luxcore.models.small.surfaces import Surfaces, pinhole_rays
+from luxcore.models.small.surfaces import Surfaces, picture_places, pinhole_rays
 
 RAY_STEPS = 16
 """Places on the way from a surface to the lamp where the depth map is asked."""
@@ -70,13 +70,8 @@ def _depth_at(
     surfaces: Surfaces, places: Float[Tensor, "n 3 h w"], depth: Float[Tensor, "h w"]
 ) -> Float[Tensor, "n h w"]:
     """The depth map where each place would be seen; 0 outside the picture."""
-    fx, fy, cx, cy = surfaces.pinhole
-    height, width = depth.shape
-    z = places[:, 2].clamp_min(1e-3)
-    u = (fx * places[:, 0] / z + cx) / width * 2 - 1
-    v = (fy * places[:, 1] / z + cy) / height * 2 - 1
-    grid = torch.stack([u, v], dim=-1).clamp(-4, 4)
-    source = depth.expand(len(places), 1, height, width)
+    grid = picture_places(places.movedim(1, 0), surfaces.pinhole, *depth.shape).clamp(-4, 4)
+    source = depth.expand(len(places), 1, *depth.shape)
     return fn.grid_sample(source, grid, mode="nearest", align_corners=False)[:, 0]
 
 
