@@ -93,6 +93,24 @@ def test_powers_are_read_off_known_light_whatever_the_paint() -> None:
     torch.testing.assert_close(found.lamps / unit, powers, rtol=0.02, atol=0.0)
 
 
+def test_a_dark_carpet_and_a_bright_panel_do_not_decide_over_the_powers() -> None:
+    y, x = torch.meshgrid(torch.linspace(0, 1, SIZE), torch.linspace(0, 1, SIZE), indexing="ij")
+    field = torch.stack([1 / (0.1 + x**2 + y**2), 1 / (0.1 + (1 - x) ** 2 + y**2)])
+    powers = torch.tensor([0.4, 0.1])
+    lights = field[:, None] * powers.view(2, 1, 1, 1).expand(2, 3, 1, 1)
+    photo = lights.sum(0) + 0.1
+    photo[:, : SIZE // 6] *= 6
+    photo[:, -SIZE // 6 :] *= 0.1
+    plain = slice(SIZE // 6, -SIZE // 6)
+    on, no_masks = torch.tensor([True, True]), torch.zeros(2, SIZE, SIZE)
+    guess = first_guess(photo, no_masks, field, on)
+    # Fitted powers count half, so shares are square roots of what the fit says.
+    wanted = torch.cat([lights, torch.full((1, 3, SIZE, SIZE), 0.1)])[:, :, plain].sqrt()
+    wanted = (wanted / wanted.sum(0))[:2]
+    # One plain least-squares fit is wrong by 0.15 here.
+    assert (guess.lamps[:, :, plain] - wanted).abs().mean() < 0.07
+
+
 def test_references_make_the_first_guess_of_another_view_better() -> None:
     plain, told = [], []
     for room in range(4):

@@ -37,6 +37,11 @@ MAX_FIT_PIXELS = 1500
 RELATIVE_FLOOR = 0.02
 """As in the scale-factor solver: errors count relative to pixel + 0.02."""
 
+REWEIGHTINGS = 6
+ORDINARY_LOG = 0.5
+"""Surfaces differ from the one colour by this natural log; what differs by more counts less."""
+
+LOG_FLOOR = 2e-3
 
 MOST_IRRADIANCE = 4.0
 """Of direct light, at unit power in 1/m²: nearer than half a metre no lamp is a point."""
@@ -137,8 +142,9 @@ def first_guess(
     strengths = torch.where(told[:, None], strengths, sent.mean((1, 2)))
     log_ratio = torch.log(field[:, None] * strengths[:, :, None, None] / sent + SHARE_FLOOR)
     shares = torch.cat([burning, level]) / sent + SHARE_FLOOR
-    shares = shares**FITTED_WEIGHT if hints is None else shares
-    if hints is not None and hints.log_shares is not None and hints.log_ratio is not None:
+    if hints is None:
+        shares = shares**FITTED_WEIGHT
+    elif hints.log_shares is not None and hints.log_ratio is not None:
         shares, log_ratio = shares * hints.log_shares.exp(), log_ratio + hints.log_ratio
     shares = shares * torch.cat([on, on.new_ones(1)]).view(-1, 1, 1, 1)
     shares = shares / shares.sum(0)
@@ -199,6 +205,8 @@ def powers_seen(
 def _fit(
     plane: Float[Tensor, "h w"], basis: Float[Tensor, "b h w"], usable: Bool[Tensor, "h w"]
 ) -> Float[Tensor, " b"]:
+    """Non-negative least squares of relative errors, reweighted so that surfaces far darker or
+    brighter than the fit (another paint, light that no lamp explains) count less."""
     from scipy.optimize import nnls
 
     values, columns = plane[usable].numpy(), basis[:, usable].numpy().T
@@ -206,9 +214,14 @@ def _fit(
     values, columns = values[::step].astype(np.float64), columns[::step].astype(np.float64)
     if len(values) < columns.shape[1]:
         return torch.ones(len(basis))
-    weight = 1 / (values + RELATIVE_FLOOR)
     # A little of everything stays: a share of exactly zero would tell the network too much.
-    powers = nnls(columns * weight[:, None], values * weight)[0] + 1e-3 * values.mean()
+    least = 1e-3 * values.mean()
+    weight = 1 / (values + RELATIVE_FLOOR)
+    for _ in range(REWEIGHTINGS):
+        powers = nnls(columns * weight[:, None], values * weight)[0] + least
+        fitted = columns @ powers
+        logs = np.log(values + LOG_FLOOR) - np.log(fitted + LOG_FLOOR)
+        weight = 1 / ((fitted + RELATIVE_FLOOR) * np.hypot(1, logs / ORDINARY_LOG))
     return torch.from_numpy(powers).float()
 
 
