@@ -36,5 +36,5 @@ class TrainSvSettings(TrainingSettings):
     """Knobs of the train_sv stage."""
 
     geometry_share: float = Field(
-        0.5, ge=0, le=1, description="share of photos given with depth and normals"
+        0.35, ge=0, le=1, description="share of photos given with depth and normals"
     )

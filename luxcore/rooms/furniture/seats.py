@@ -42,57 +42,39 @@ def sofa(rng: Rng, palette: Palette, seats: int | None = None) -> Piece:
         block("base", fabric, (width - 0.02, depth, 0.22), (0, 0, foot), 0.03),
         block("back", fabric, (width - 0.04, 0.2, back - foot), (0, -depth / 2 + 0.1, foot), soft),
     ]
-    arm_top = high + between(rng, 0.12, 0.22)
-    for side in (-1, 1):
-        parts.append(
-            block(
-                "arm",
-                fabric,
-                (arm, depth, arm_top - foot),
-                (side * (width - arm) / 2, 0, foot),
-                soft,
-            )
-        )
+    arm_height = high + between(rng, 0.12, 0.22) - foot
+    arm_x = (width - arm) / 2
+    parts += [
+        block("arm", fabric, (arm, depth, arm_height), (side * arm_x, 0, foot), soft)
+        for side in (-1, 1)
+    ]
     for k in range(count):
-        x = (k - (count - 1) / 2) * seat
-        parts.append(
-            block(
-                "seat",
-                fabric,
-                (seat - 0.01, depth - 0.24, high - foot - 0.2),
-                (x, 0.1, foot + 0.2),
-                0.05,
-            )
-        )
-        cushion = Ellipsoid((seat / 2 - 0.01, 0.1, 0.23), 20, 0.45)
-        parts.append(
-            part(
-                "cushion",
-                cushion,
-                fabric,
-                (x, -depth / 2 + 0.28, high + 0.2),
-                (-12.0, 0.0, 0.0),
-                True,
-            )
-        )
-    for _ in range(int(rng.integers(0, 4))):
-        size = between(rng, 0.17, 0.22)
-        accent = palette.new("fabric", palette.accent(), scale=between(rng, 0.02, 0.12))
-        parts.append(
-            part(
-                "scatter",
-                Ellipsoid((size, 0.07, size), 16, 0.5),
-                accent,
-                (
-                    between(rng, -width / 2 + 0.35, width / 2 - 0.35),
-                    -depth / 2 + 0.43,
-                    high + size - 0.02,
-                ),
-                (-20.0, between(rng, -15, 15), 0.0),
-                True,
-            )
-        )
+        parts += _seat(fabric, (k - (count - 1) / 2) * seat, (seat, depth), foot, high)
+    parts += [
+        _scatter_cushion(rng, palette, width, depth, high) for _ in range(int(rng.integers(0, 4)))
+    ]
     return Piece("sofa", tuple(parts), width, depth, back)
+
+
+def _seat(fabric: str, x: float, size: tuple[float, float], foot: float, high: float) -> list[Part]:
+    """A seat cushion at `x` and the one behind its sitter's back; `size` is (seat, depth)."""
+    seat, depth = size
+    block_size = (seat - 0.01, depth - 0.24, high - foot - 0.2)
+    cushion = Ellipsoid((seat / 2 - 0.01, 0.1, 0.23), 20, 0.45)
+    behind = (x, -depth / 2 + 0.28, high + 0.2)
+    return [
+        block("seat", fabric, block_size, (x, 0.1, foot + 0.2), 0.05),
+        part("cushion", cushion, fabric, behind, (-12.0, 0.0, 0.0), True),
+    ]
+
+
+def _scatter_cushion(rng: Rng, palette: Palette, width: float, depth: float, high: float) -> Part:
+    size = between(rng, 0.17, 0.22)
+    accent = palette.new("fabric", palette.accent(), scale=between(rng, 0.02, 0.12))
+    x = between(rng, -width / 2 + 0.35, width / 2 - 0.35)
+    place = (x, -depth / 2 + 0.43, high + size - 0.02)
+    turned = (-20.0, between(rng, -15, 15), 0.0)
+    return part("scatter", Ellipsoid((size, 0.07, size), 16, 0.5), accent, place, turned, True)
 
 
 def armchair(rng: Rng, palette: Palette) -> Piece:
