@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 from flows.plan import StagePlan
-from luxcore.evaluate.answers import answers
+from luxcore.evaluate.answers import COLUMNS, answers
 
 
 def plan_table(plans: list[StagePlan]) -> str:
@@ -31,16 +31,8 @@ def metrics_table(root: Path) -> str:
     path = root / "artifacts" / "metrics" / "evaluate.json"
     if not path.is_file():
         return "no evaluation yet."
-    rows = [
-        [
-            a.what,
-            f"{a.value:.2f}",
-            "" if a.beside_value is None else f"{a.beside_value:.2f}",
-            a.beside,
-        ]
-        for a in answers(json.loads(path.read_text()))
-    ]
-    return _table(["PSNR of", "this run, dB", "beside it, dB", "which is"], rows)
+    rows = [list(answer.row) for answer in answers(json.loads(path.read_text()))]
+    return _table(list(COLUMNS), rows)
 
 
 def _table(columns: list[str], rows: list[list[str]]) -> str:

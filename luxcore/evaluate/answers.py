@@ -36,6 +36,15 @@ class Answer:
     """The plain way; empty where there is none."""
     beside_value: float | None = None
 
+    @property
+    def row(self) -> tuple[str, str, str, str]:
+        """As a row below `COLUMNS`."""
+        beside = "" if self.beside_value is None else f"{self.beside_value:.2f}"
+        return self.what, f"{self.value:.2f}", beside, self.beside
+
+
+COLUMNS = ("PSNR of", "this run, dB", "beside it, dB", "which is")
+
 
 def answers(metrics: Mapping[str, float]) -> list[Answer]:
     """Those of the questions that an evaluation's flat metrics answer."""

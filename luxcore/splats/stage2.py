@@ -78,7 +78,7 @@ def fit_lights(
     Raises DivergedError when the fit stops being finite.
     """
     lamps = load_masks(masks_dir).lamps
-    fit = _prepare(capture, stage1_dir, fuse_dir, lamps, settings, seed)
+    fit = open_light_fit(capture, stage1_dir, fuse_dir, lamps, settings, seed)
     key = _run_key(capture, stage1_dir, fuse_dir, lamps, settings, seed)
     folder = CheckpointFolder(checkpoint, key) if checkpoint else None
     quality = LightQuality(fit)
@@ -98,7 +98,7 @@ def fit_lights(
     return Stage2Result(metrics, tuple(curve))
 
 
-def _prepare(
+def open_light_fit(
     capture: Capture,
     stage1_dir: Path,
     fuse_dir: Path,
@@ -106,6 +106,8 @@ def _prepare(
     settings: RelightSettings,
     seed: int,
 ) -> LightFit:
+    """A fit of the lights of `fuse_dir` onto the Gaussians of `stage1_dir`, before its first
+    step."""
     device = open_device()
     views = load_light_views(device, capture, fuse_dir, len(lamps), settings.max_side)
     gaussians = read_ply(stage1_dir / "splats.ply")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from luxcore.evaluate.answers import answers
-from luxcore.report.content import Section, Strip, Table, number
+from luxcore.evaluate.answers import COLUMNS, answers
+from luxcore.report.content import Section, Strip, Table
 from luxcore.report.gallery import Gallery
 from luxcore.report.sources import read_json
 
@@ -16,18 +16,9 @@ def chapter(artifacts: Path, gallery: Gallery, facts: dict[str, Any]) -> Section
     blocks: list[Strip | Table] = []
     metrics = read_json(artifacts / "evaluate" / "metrics.json") or {}
     if found := answers(metrics):
-        rows = tuple(
-            (
-                a.what,
-                number(a.value),
-                "" if a.beside_value is None else number(a.beside_value),
-                a.beside,
-            )
-            for a in found
-        )
-        heads = ("what", "this run, dB", "beside it, dB", "which is")
+        rows = tuple(answer.row for answer in found)
         note = "PSNR on AgX pictures, light scaled channel by channel; all scores are under Tables."
-        blocks.append(Table("How close to the truth", "evaluate", heads, rows, note=note))
+        blocks.append(Table("How close to the truth", "evaluate", COLUMNS, rows, note=note))
     timings = {
         path.stem: read_json(path) for path in sorted((artifacts / "timings").glob("*.json"))
     }

@@ -15,14 +15,10 @@ from luxcore.capture import Capture, load_capture
 from luxcore.masks.store import load_masks
 from luxcore.settings.relight import RelightSettings
 from luxcore.splats.baked import BakedView, bake, padded, padded_zeros
-from luxcore.splats.device import Device, open_device
-from luxcore.splats.initial import scene_extent
+from luxcore.splats.device import Device
 from luxcore.splats.light_fit import LightFit
 from luxcore.splats.light_quality import LightQuality
-from luxcore.splats.light_views import load_light_views, read_exposure
-from luxcore.splats.ply import read_ply
-from luxcore.splats.rates import Rates
-from luxcore.splats.views import split_views
+from luxcore.splats.stage2 import open_light_fit
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, around, stopwatch
 
 MAX_SIDE = 160
@@ -70,20 +66,9 @@ def _open(bench: Bench, capture: Capture, frozen_iterations: int) -> LightFit:
         "joint_iterations": JOINT, "frozen_iterations": frozen_iterations, "max_side": MAX_SIDE,
     }  # fmt: skip
     settings = bench.params.relight.model_copy(update=update)
-    device, lamps = open_device(), load_masks(bench.input("masks")).lamps
-    views = load_light_views(device, capture, bench.input("fuse"), len(lamps), MAX_SIDE)
-    gaussians = read_ply(bench.input("splat") / "splats.ply")
-    return LightFit(
-        device,
-        views,
-        split_views(len(views.cameras), settings.holdout_every),
-        gaussians,
-        [lamp.on for lamp in lamps],
-        Rates.for_scene(scene_extent(gaussians.means, views.cameras), settings.geometry_rate_scale),
-        settings,
-        exposure=read_exposure(bench.input("fuse"), capture),
-        seed=0,
-    )
+    lamps = load_masks(bench.input("masks")).lamps
+    stage1, fuse = bench.input("splat"), bench.input("fuse")
+    return open_light_fit(capture, stage1, fuse, lamps, settings, seed=0)
 
 
 class _Normal:
