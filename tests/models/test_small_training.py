@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from numpy.random import PCG64, Generator
 
 from luxcore.errors import DivergedError
-from luxcore.models.small.batches import GroupBatches, SingleBatches
+from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
+from luxcore.models.small.examples import to_example
 from luxcore.models.small.fit import FitSettings, fit, schedule
 from luxcore.models.small.heads import light_fields
 from luxcore.models.small.losses import example_loss
@@ -71,6 +73,31 @@ def test_a_batch_depends_on_its_number_only(kind: type, pool: CropPool) -> None:
     for (a, _), (b, _) in zip(first, again, strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=0)
     assert not torch.equal(first[0][0], batches.batch(4)[0][0])
+
+
+def test_references_that_the_single_view_model_took_apart_tell_of_their_own_lamps_only(
+    pool: CropPool,
+) -> None:
+    told = 0
+    for group in pool.groups:
+        batches = GroupBatches(CropPool((group,)), 5, photos=4, single=tiny("sv").eval())
+        plain = GroupBatches(CropPool((group,)), 5, photos=4)
+        if not any(view.masks.any() for view in group):
+            continue
+        told += 1
+        for (a, _), (b, _) in zip(batches.batch(2), batches.batch(2), strict=True):
+            torch.testing.assert_close(a, b, rtol=0, atol=0)
+        with_model = torch.cat([f for f, _ in batches.batch(2)])
+        assert torch.isfinite(with_model).all()
+        assert not torch.equal(with_model, torch.cat([f for f, _ in plain.batch(2)]))
+        example = to_example(group[0], geometry=True, keep=np.ones(len(group[0].on), bool))
+        seen = torch.zeros(len(example.on), dtype=torch.bool)
+        seen[0] = True
+        always = Disturbance(Generator(PCG64(0)), tiny("sv").eval(), predicted_share=1.0)
+        light = always.light(example, seen)
+        assert (light[1:] == 0).all()
+        assert (light[0] > 0).any()
+    assert told
 
 
 def test_resume_equals_an_unbroken_run(pool: CropPool, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from jaxtyping import Bool, Float
 from numpy.random import PCG64, Generator, SeedSequence
 from torch import Tensor
 
@@ -15,6 +16,7 @@ from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
+from luxcore.models.small.heads import lamp_light, light_fields
 from luxcore.models.small.hints import KnownLight, references_of
 from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
@@ -53,13 +55,25 @@ class SingleBatches:
         return found
 
 
+PREDICTED_SHARE = 0.4
+"""Of training references whose light is what the single-view model makes of them."""
+
+DISTURBED_SHARE = 0.6
+"""Of the other ones whose light is wrong by smooth noise."""
+
+
 @dataclass(frozen=True)
 class GroupBatches:
-    """Views of `pool` with the light of one or two neighbours given, as in a harmonizing pass."""
+    """Views of `pool` with the light of one or two neighbours given, as in a harmonizing pass.
+
+    `single` is the single-view model that takes some references apart; without it their light is
+    the truth, or near it.
+    """
 
     pool: CropPool
     seed: int
     photos: int = 4
+    single: UNet | None = None
 
     def batch(self, step: int) -> list[tuple[Tensor, Example]]:
         """`photos` examples whose features hold the warped light of their references."""
@@ -70,23 +84,47 @@ class GroupBatches:
             references = others[: int(rng.integers(1, 3))]
             known = np.any([v.masks.any((1, 2)) for v in references], axis=0)
             if known.any():
-                found.append(group_example(target, references, known, rng))
+                disturbing = Disturbance(rng, self.single)
+                found.append(group_example(target, references, known, disturbing))
         return found
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Makes light and depth imperfect, as a single-view model and estimated geometry do."""
+
+    rng: Generator
+    single: UNet | None = None
+    predicted_share: float = PREDICTED_SHARE
+
+    def light(self, example: Example, seen: Bool[Tensor, " k"]) -> Float[Tensor, "k 3 h w"]:
+        """What a pass may be told of the light of a reference that shows the lamps `seen`."""
+        if self.single is not None and self.rng.random() < self.predicted_share:
+            return _predicted(self.single, example, seen)
+        if self.rng.random() >= DISTURBED_SHARE:
+            return example.lights
+        shape = example.photo.shape[-2:]
+        noise = [_smooth_noise(shape, self.rng, 0.25) for _ in range(len(example.on))]
+        return example.lights * torch.stack(noise)[:, None].exp()
+
+    def depth(self, view: LitCrop) -> LitCrop:
+        """Depth with smooth errors of a few per cent, as splats and SfM have."""
+        noise = _smooth_noise(view.depth_m.shape, self.rng, 0.02).numpy()
+        return replace(view, depth_m=view.depth_m * np.exp(noise))
 
 
 def group_example(
     target: LitCrop,
     references: Sequence[LitCrop],
     known: np.ndarray,
-    rng: Generator | None = None,
+    disturbance: Disturbance | None = None,
 ) -> tuple[Tensor, Example]:
-    """A target with the true light of its references; `rng` makes that light and depth imperfect,
-    as a single-view model and estimated geometry would."""
+    """A target with the light of its references: true, or as `disturbance` makes it."""
     keep = known | target.masks.any((1, 2))
-    if rng is not None:
-        target = _bent(target, rng)
+    if disturbance is not None:
+        target = disturbance.depth(target)
     example = to_example(target, geometry=True, keep=keep)
-    lights = [_known_light(view, keep, rng) for view in references]
+    lights = [_known_light(view, keep, disturbance) for view in references]
     view = TargetView(example.photo, example.masks, example.on, example.surfaces)
     told = references_of(lights, len(example.on))
     features, warped = multiview_features(view, target.camera, told)
@@ -101,23 +139,28 @@ def single_features(example: Example, estimator: UNet | None) -> Tensor:
     return lamp_features(example.photo, example.masks, example.on, surfaces)
 
 
-def _known_light(view: LitCrop, keep: np.ndarray, rng: Generator | None) -> KnownLight:
+def _known_light(view: LitCrop, keep: np.ndarray, disturbance: Disturbance | None) -> KnownLight:
     example = to_example(view, geometry=True, keep=keep)
-    light = example.lights
-    if rng is not None and rng.random() < 0.6:
-        noise = [_smooth_noise(light.shape[-2:], rng, 0.25) for _ in range(len(light))]
-        light = light * torch.stack(noise)[:, None].exp()
     assert example.surfaces is not None
     seen = torch.from_numpy(view.masks[keep].any((1, 2)))
+    light = example.lights if disturbance is None else disturbance.light(example, seen)
     return KnownLight(
         view.camera, example.photo, example.masks, example.on, example.surfaces, light, seen
     )
 
 
-def _bent(view: LitCrop, rng: Generator) -> LitCrop:
-    """Depth with smooth errors of a few per cent, as splats and SfM have."""
-    noise = _smooth_noise(view.depth_m.shape, rng, 0.02).numpy()
-    return replace(view, depth_m=view.depth_m * np.exp(noise))
+def _predicted(
+    single: UNet, example: Example, seen: Bool[Tensor, " k"]
+) -> Float[Tensor, "k 3 h w"]:
+    """The light that the single-view model finds, geometry given; 0 of lamps that are not seen."""
+    light = torch.zeros_like(example.lights)
+    if bool(seen.any()):
+        on = example.on[seen]
+        features = lamp_features(example.photo, example.masks[seen], on, example.surfaces)
+        with torch.no_grad():
+            fields = light_fields(single(features), on)
+        light[seen] = lamp_light(fields, example.photo, on)
+    return light
 
 
 def _smooth_noise(shape: Sequence[int], rng: Generator, sigma: float) -> Tensor:

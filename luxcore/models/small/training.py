@@ -101,7 +101,9 @@ def train_mv(
     single-view weights, whose channels it shares."""
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("mv", base_weights("mv", settings, base), seed)
-    batches = GroupBatches(pool, seed, settings.photos_per_step)
+    shipped = shipped_weights("sv")
+    single = load_network(shipped, "sv") if shipped.is_file() else None
+    batches = GroupBatches(pool, seed, settings.photos_per_step, single)
     return _train(
         "mv", net, batches, group_cases(aside, seed), settings, out, checkpoint, dataset_dir
     )
