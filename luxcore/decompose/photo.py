@@ -13,6 +13,9 @@ from luxcore.errors import DivergedError
 from luxcore.light.agx import agx
 from luxcore.models.interface import Decomposer, Decomposition, Geometry
 
+EXACT_DB = 60.0
+"""A recomposed photo that errs by less than its 8 bits do (59 dB) leaves nothing to solve for."""
+
 
 @dataclass(frozen=True)
 class PhotoLight:
@@ -60,16 +63,17 @@ def _best_scale(
     well they do in dB. `shown` is the photo through AgX.
 
     A model whose lights add up already (the small one) has factors of its own; those stay when
-    they rebuild the photo at least as well as the solved ones.
+    they rebuild the photo at least as well as the solved ones, or exactly.
     """
     from luxcore.light.scale_factors import solve
 
+    own = _recomposition_db(shown, light) if on.any() else 0.0
+    if own >= EXACT_DB:
+        return light.scale, own
     solved = np.zeros((len(on), 3), np.float32)
-    if not on.any():
-        return solved, _recomposition_db(shown, replace(light, scale=solved))
-    solved[on] = solve(exposed, light.ambient, light.olat[on])
+    if on.any():
+        solved[on] = solve(exposed, light.ambient, light.olat[on])
     by_solved = _recomposition_db(shown, replace(light, scale=solved))
-    own = _recomposition_db(shown, light)
     return (solved, by_solved) if by_solved > own else (light.scale, own)
 
 
