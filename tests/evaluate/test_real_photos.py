@@ -10,7 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from luxcore.errors import InputError
-from luxcore.evaluate.real_photos import GRID_SIDE, main, read_published, real_photo_rows
+from luxcore.evaluate.published import GRID_SIDE, read_published, real_photo_rows
+from luxcore.evaluate.real_photos import main
 from luxcore.files.exr import write_exr
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 
-from luxcore.models.small.ablation import (
+from luxcore.models.small.alternatives import (
     FLOW_STEPS,
     FlowBatches,
     PixelBatches,
@@ -18,7 +20,7 @@ from luxcore.models.small.levels import display_curve, linear_of
 from luxcore.models.small.network import NetworkShape, UNet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.sketch import SketchRooms
-from luxcore.models.small.training import single_cases
+from luxcore.models.small.training import SHAPES, single_cases
 from tests.models.sketched import TINY
 
 
@@ -58,8 +60,8 @@ def test_a_perfect_flow_arrives_in_any_number_of_steps(pool: CropPool) -> None:
 
 
 def test_every_variant_is_scored(pool: CropPool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("luxcore.models.small.ablation.WIDTHS", TINY)
-    monkeypatch.setattr("luxcore.models.small.ablation.shipped_estimator", lambda: None)
+    monkeypatch.setitem(SHAPES, "sv", replace(SHAPES["sv"], widths=TINY, together=2))
+    monkeypatch.setattr("luxcore.models.small.alternatives.shipped_estimator", lambda: None)
     scores = compare(pool, single_cases(pool, 0), steps=1, photos=1, rate=1e-3, seed=0)
     assert list(scores) == ["fractions", "pixels", *(f"flow, {n} steps" for n in FLOW_STEPS)]
     assert all(0 < row["lamp on"] < 60 for row in scores.values())

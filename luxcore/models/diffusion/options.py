@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import torch
 from pydantic import ValidationError
 
 from luxcore.errors import InputError
@@ -46,13 +45,3 @@ def parse_options(kind: type[Section], values: Any, source: str) -> Section:
 def training_digest(settings: Settings) -> str:
     """Names what a training learns: equal for settings that lead to the same weights."""
     return value_digest(settings.model_dump(mode="json", exclude=WITHOUT_EFFECT))
-
-
-def pick_device(name: str) -> torch.device:
-    """The device of that name; `auto` is a GPU where there is one, else the CPU."""
-    if name == "auto":
-        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    try:
-        return torch.empty(0, device=name).device
-    except (RuntimeError, AssertionError) as error:
-        raise InputError(f'torch has no device "{name}" here.') from error

@@ -11,9 +11,10 @@ from jaxtyping import Bool, Float
 from luxcore.light.agx import agx, agx_inverse
 from luxcore.light.scale_factors import solve
 from luxcore.models.diffusion.brackets import merged_light
+from luxcore.models.diffusion.device import pick_device
 from luxcore.models.diffusion.exported import exported_folder
 from luxcore.models.diffusion.frames import mask_to_tensor, model_size, to_picture, to_tensor
-from luxcore.models.diffusion.options import parse_options, pick_device
+from luxcore.models.diffusion.options import parse_options
 from luxcore.models.flux_kontext.prompts import Brightness, LightKind, LightOffPrompt, OlatPrompt
 from luxcore.models.flux_kontext.weights_folder import MODEL, TrainedEditor, open_editor
 from luxcore.models.interface import BackendSettings, Decomposer, Decomposition, Geometry

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from luxcore.errors import InputError
 from luxcore.models.diffusion.base import base_folder, load_component
-from luxcore.models.diffusion.options import pick_device
+from luxcore.models.diffusion.device import pick_device
 from luxcore.models.diffusion.text import clip_sequences
 from luxcore.models.diffusion.weights import read_weights, write_weights
 from luxcore.models.flux_kontext.prompts import Prompt, all_prompts

@@ -15,10 +15,11 @@ from luxcore.errors import InputError
 from luxcore.light.agx import agx, agx_inverse
 from luxcore.light.scale_factors import solve
 from luxcore.models.diffusion.brackets import merged_light, olat_exposure, olat_picture
+from luxcore.models.diffusion.device import pick_device
 from luxcore.models.diffusion.exported import exported_folder
 from luxcore.models.diffusion.frames import mask_to_tensor, model_size, to_picture, to_tensor
 from luxcore.models.diffusion.latents import decode, encode, latent_scale
-from luxcore.models.diffusion.options import parse_options, pick_device
+from luxcore.models.diffusion.options import parse_options
 from luxcore.models.interface import (
     MAX_VIEWS_PER_PASS,
     BackendSettings,

@@ -7,17 +7,18 @@ from pathlib import Path
 
 from luxcore.models.diffusion.command import train_command
 from luxcore.models.diffusion.events import Listener
-from luxcore.models.diffusion.loop import train
-from luxcore.models.diffusion.options import training_digest
-from luxcore.models.diffusion.rooms import open_sets
-from luxcore.models.multiview_unet.examples import ViewExamples
-from luxcore.models.multiview_unet.trainee import MultiViewTrainee
-from luxcore.models.multiview_unet.weights_folder import load_base
 from luxcore.settings.paper_models import MultiViewTraining
 
 
 def train_multiview(settings: MultiViewTraining, out: Path, listener: Listener) -> Path:
     """Train the paper's multi-view model, or go on from the newest checkpoint in the folder."""
+    from luxcore.models.diffusion.loop import train
+    from luxcore.models.diffusion.options import training_digest
+    from luxcore.models.diffusion.rooms import open_sets
+    from luxcore.models.multiview_unet.examples import ViewExamples
+    from luxcore.models.multiview_unet.trainee import MultiViewTrainee
+    from luxcore.models.multiview_unet.weights_folder import load_base
+
     seed = settings.loop.seed
     sets = open_sets(settings.data, seed)
     examples = ViewExamples(sets, settings.data, settings.model, seed)

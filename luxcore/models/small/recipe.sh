@@ -17,7 +17,7 @@ install_weights() { cp "$out/$1/model.safetensors" "$weights/$2.safetensors"; }
 python -m luxcore.models.small.rooms --out "$out/rooms"
 cp "$out/rooms/manifest.json" "$weights/data_manifest.json"
 
-train geometry geometry --groups 1000 --sketches 0 --size 64 --photos 12 --steps 9000 --rate 2e-3
+train geometry geometry --groups 3000 --sketches 0 --size 64 --photos 12 --steps 9000 --rate 2e-3
 install_weights geometry geometry
 
 train sv48 sv --groups 1200 --sketches 40 --size 48 --steps 12000 --rate 2e-3

@@ -10,12 +10,8 @@ import sys
 from pathlib import Path
 
 import click
-import numpy as np
 
 from luxcore.errors import LuxError
-from luxcore.files.photos import write_png
-from luxcore.models.small.geometry_training import train_geometry
-from luxcore.models.small.training import train_mv, train_sv
 from luxcore.settings.train_mv import TrainMvSettings
 from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
@@ -35,6 +31,12 @@ STEPS = 20_000
 @click.option("--sketches", default=300, show_default=True, help="Groups of sketched rooms.")
 @click.option("--size", default=96, show_default=True, help="Side of a photo in pixels.")
 @click.option("--rate", default=2e-3, show_default=True, help="Peak learning rate.")
+@click.option(
+    "--geometry-share",
+    default=TrainSvSettings().geometry_share,
+    show_default=True,
+    help="Single-view photos that come with depth and normals; of the others both are guessed.",
+)
 @click.option("--seed", default=0, show_default=True)
 def main(
     kind: str,
@@ -48,10 +50,17 @@ def main(
     sketches: int,
     size: int,
     rate: float,
+    geometry_share: float,
     seed: int,
 ) -> None:
     """Train the geometry, the single-view (sv) or the multi-view (mv) model, in this order: each
     takes the shipped weights of those before it. Writes weights, card and curve."""
+    import numpy as np
+
+    from luxcore.files.photos import write_png
+    from luxcore.models.small.geometry_training import train_geometry
+    from luxcore.models.small.training import train_mv, train_sv
+
     shared = {
         "steps": steps,
         "groups": groups,
@@ -75,7 +84,8 @@ def main(
             click.echo(f"{out}: {scores}")
             return
         if kind == "sv":
-            result = train_sv(data, out, TrainSvSettings(**shared), seed, checkpoint=checkpoint)
+            settings = TrainSvSettings(**shared, geometry_share=geometry_share)
+            result = train_sv(data, out, settings, seed, checkpoint=checkpoint)
         else:
             result = train_mv(data, out, TrainMvSettings(**shared), seed, checkpoint=checkpoint)
     except LuxError as error:
