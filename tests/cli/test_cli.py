@@ -32,6 +32,33 @@ def test_help_of_every_command_imports_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "heavy: []"
 
 
+@pytest.mark.parametrize(
+    "module",
+    [
+        "luxcore.models.small.train",
+        "luxcore.models.small.ablation",
+        "luxcore.models.small.rooms",
+        "luxcore.models.flux_kontext.train",
+        "luxcore.models.multiview_unet.train",
+        "luxcore.evaluate.real_photos",
+        "benchmarks.splats",
+    ],
+)
+def test_help_of_tools_run_as_modules_imports_nothing_heavy(module: str) -> None:
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = [{module!r}, '--help']\n"
+        "try:\n"
+        f"    runpy.run_module({module!r}, run_name='__main__')\n"
+        "except SystemExit as stop:\n"
+        "    assert not stop.code\n"
+        f"print('heavy:', sorted({HEAVY!r} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "heavy: []"
+
+
 def test_help_names_every_command():
     listed = run_lux("--help").stdout
     assert all(f"  {name} " in listed for name in COMMANDS)
