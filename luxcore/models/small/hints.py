@@ -56,7 +56,7 @@ class KnownLight:
 
 
 @dataclass(frozen=True)
-class Lesson:
+class Calibration:
     """What a reference tells: powers, and by how much the first guess with them is wrong (see
     `_corrections`) on its `usable` surfaces."""
 
@@ -74,7 +74,7 @@ class References:
 
     views: tuple[KnownLight, ...]
     centres: Float[Tensor, "k 3"]
-    lessons: tuple[Lesson, ...]
+    calibrations: tuple[Calibration, ...]
     light: bool
 
 
@@ -86,12 +86,16 @@ def references_of(views: Sequence[KnownLight], lamps: int, *, light: bool = True
         here = moved(seen.T, view.camera, views[0].camera).T
         take = valid & ~centres.isfinite().all(1)
         centres[take] = here[take]
-    lessons = [_lesson(view, views[0].camera, centres) for view in views if light and lamps]
-    told = tuple(lesson for lesson in lessons if lesson is not None)
+    calibrations = [
+        _calibration(view, views[0].camera, centres) for view in views if light and lamps
+    ]
+    told = tuple(found for found in calibrations if found is not None)
     return References(tuple(views), centres, told, light)
 
 
-def _lesson(view: KnownLight, first: Camera, centres: Float[Tensor, "k 3"]) -> Lesson | None:
+def _calibration(
+    view: KnownLight, first: Camera, centres: Float[Tensor, "k 3"]
+) -> Calibration | None:
     plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0) < 0.1)
     usable = plain & view.surfaces.valid
     if int(usable.sum()) < FEWEST_PIXELS:
@@ -100,21 +104,21 @@ def _lesson(view: KnownLight, first: Camera, centres: Float[Tensor, "k 3"]) -> L
     field = unit_irradiance(view.masks, view.surfaces, points, points.isfinite().all(1)).total
     powers = powers_seen(view.photo, view.lights, field, view.on, view.known, usable)
     guess = first_guess(view.photo, view.masks, field, view.on, Hints(powers))
-    return Lesson(view, usable, powers, _corrections(view, guess))
+    return Calibration(view, usable, powers, _corrections(view, guess))
 
 
 def hints_for(surfaces: Surfaces | None, camera: Camera, references: References) -> Hints | None:
     """Powers and corrections for a view with these `surfaces`; None where nothing can be told."""
-    if surfaces is None or not references.lessons:
+    if surfaces is None or not references.calibrations:
         return None
     lamps = len(references.centres)
-    powers = references.lessons[0].powers
-    for lesson in references.lessons[1:]:
-        powers = _joined(powers, lesson.powers)
+    powers = references.calibrations[0].powers
+    for calibration in references.calibrations[1:]:
+        powers = _joined(powers, calibration.powers)
     height, width = surfaces.points.shape[1:]
     weighted, weight = torch.zeros(2 * lamps + 1, 3, height, width), torch.zeros(height, width)
-    for lesson in references.lessons:
-        carried, share = _carried(lesson, surfaces, camera)
+    for calibration in references.calibrations:
+        carried, share = _carried(calibration, surfaces, camera)
         weighted, weight = weighted + carried, weight + share
     correction = weighted / (weight + 1e-2)
     shares, log_ratio = correction[: lamps + 1], correction[lamps + 1 :]
@@ -156,10 +160,10 @@ def _corrections(view: KnownLight, guess: FirstGuess) -> Float[Tensor, "n 3 h w"
 
 
 def _carried(
-    lesson: Lesson, surfaces: Surfaces, camera: Camera
+    calibration: Calibration, surfaces: Surfaces, camera: Camera
 ) -> tuple[Float[Tensor, "n 3 y x"], Float[Tensor, "y x"]]:
     """Sums of a reference's corrections weighted by nearness and facing, and of the weights."""
-    view, usable, corrections = lesson.view, lesson.usable, lesson.corrections
+    view, usable, corrections = calibration.view, calibration.usable, calibration.corrections
     height, width = surfaces.points.shape[1:]
     step = max(1, math.ceil(max(height, width) / PLACES))
     here = every(surfaces.points, step)
