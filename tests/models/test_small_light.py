@@ -139,3 +139,14 @@ def test_enlarged_fractions_sum_to_one_and_follow_the_photos_edge() -> None:
     step = full.fraction[1, 0, 64, 67] - full.fraction[1, 0, 64, 66]
     plain = torch.nn.functional.interpolate(fraction, (128, 128), mode="bilinear")[1, 0, 64]
     assert step > 2 * (plain[67] - plain[66]), "the guided filter restores the edge"
+
+
+def test_a_chequerboard_in_the_ratio_does_not_show() -> None:
+    outputs = torch.zeros(1, SV_OUTPUTS, 8, 8)
+    outputs[:, 6:9, ::2, ::2] = 1
+    outputs[:, 6:9, 1::2, 1::2] = 1
+    ratio = light_fields(outputs, torch.tensor([False])).log_ratio
+    torch.testing.assert_close(ratio[..., 1:-1, 1:-1], torch.full((1, 3, 6, 6), 0.5))
+    outputs[:, 6:9] = 0.7
+    level = light_fields(outputs, torch.tensor([False])).log_ratio
+    torch.testing.assert_close(level, torch.full((1, 3, 8, 8), 0.7))

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+import torch.nn.functional as fn
 from jaxtyping import Bool, Float
 from torch import Tensor
 
@@ -89,9 +90,18 @@ def _own_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> Li
     logits = torch.cat([ambient, lamp.masked_fill(off, float("-inf"))])
     return LightFields(
         logits.softmax(dim=0),
-        ratio.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
+        _smoothed(ratio).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
         MAX_LOG_BOOST * torch.sigmoid(boost - 2),
     )
+
+
+def _smoothed(field: Float[Tensor, "k 3 h w"]) -> Float[Tensor, "k 3 h w"]:
+    """Binomial over 3×3: the network's last upsampling leaves a chequerboard of two pixels, which a
+    ratio, that no softmax bounds, would show."""
+    taps = field.new_tensor([0.25, 0.5, 0.25])
+    kernel = (taps[:, None] * taps)[None, None]
+    planes = fn.pad(field.flatten(0, 1)[:, None], (1, 1, 1, 1), mode="replicate")
+    return fn.conv2d(planes, kernel).reshape(field.shape)
 
 
 def lamp_light(

@@ -170,35 +170,33 @@ class Attention(nn.Module):
         nn.init.zeros_(self.out.weight)
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
+        q, k, v = self._tokens(x)
+        mixed = fn.scaled_dot_product_attention(q, k, v)
+        return x + self.out(mixed.transpose(-1, -2).reshape(x.shape))
+
+    def _tokens(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "3 b heads places c2"]:
         b, c, h, w = x.shape
         tokens = self.qkv(self.norm(x)).reshape(b, 3, self.heads, c // self.heads, h * w)
-        q, k, v = tokens.transpose(-1, -2).unbind(1)
-        mixed = fn.scaled_dot_product_attention(q, k, v)
-        return x + self.out(mixed.transpose(-1, -2).reshape(b, c, h, w))
+        return tokens.permute(1, 0, 2, 4, 3)
 
 
-class AmongLamps(nn.Module):
+class AmongLamps(Attention):
     """At every place the lamps of a photo see each other: one lamp's share is what the others
     leave."""
 
     def __init__(self, width: int, heads: int) -> None:
-        super().__init__()
-        self.heads = heads
-        self.norm = nn.GroupNorm(8, width)
-        self.qkv = nn.Conv2d(width, 3 * width, 1)
-        self.out = nn.Conv2d(width, width, 1)
-        for parameter in self.out.parameters():
-            nn.init.zeros_(parameter)
+        super().__init__(width, heads)
+        assert self.out.bias is not None
+        nn.init.zeros_(self.out.bias)
 
     def forward(
-        self, x: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None
+        self, x: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
     ) -> Float[Tensor, "b c h w"]:
-        b, c, h, w = x.shape
-        tokens = self.qkv(self.norm(x)).reshape(b, 3, self.heads, c // self.heads, h * w)
-        q, k, v = tokens.permute(1, 4, 2, 0, 3)
+        """`photo` as in `UNet.forward`."""
+        q, k, v = self._tokens(x).permute(0, 3, 2, 1, 4)
         same = None if photo is None else photo[:, None] == photo[None]
         mixed = fn.scaled_dot_product_attention(q, k, v, attn_mask=same)
-        return x + self.out(mixed.permute(2, 1, 3, 0).reshape(b, c, h, w))
+        return x + self.out(mixed.permute(2, 1, 3, 0).reshape(x.shape))
 
 
 Net = TypeVar("Net", bound=nn.Module)
