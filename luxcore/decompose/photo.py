@@ -67,12 +67,13 @@ def _best_scale(
     """
     from luxcore.light.scale_factors import solve
 
-    own = _recomposition_db(shown, light) if on.any() else 0.0
+    solved = np.zeros((len(on), 3), np.float32)
+    if not on.any():
+        return solved, _recomposition_db(shown, replace(light, scale=solved))
+    own = _recomposition_db(shown, light)
     if own >= EXACT_DB:
         return light.scale, own
-    solved = np.zeros((len(on), 3), np.float32)
-    if on.any():
-        solved[on] = solve(exposed, light.ambient, light.olat[on])
+    solved[on] = solve(exposed, light.ambient, light.olat[on])
     by_solved = _recomposition_db(shown, replace(light, scale=solved))
     return (solved, by_solved) if by_solved > own else (light.scale, own)
 

@@ -17,7 +17,6 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.cameras import Camera
-from luxcore.models.small.levels import CLIPPED
 from luxcore.models.small.prior import (
     SHARE_FLOOR,
     FirstGuess,
@@ -25,6 +24,7 @@ from luxcore.models.small.prior import (
     Powers,
     first_guess,
     powers_seen,
+    reflecting,
     unit_irradiance,
 )
 from luxcore.models.small.surfaces import Surfaces, lamp_centres
@@ -96,8 +96,7 @@ def references_of(views: Sequence[KnownLight], lamps: int, *, light: bool = True
 def _calibration(
     view: KnownLight, first: Camera, centres: Float[Tensor, "k 3"]
 ) -> Calibration | None:
-    plain = (view.photo.amax(0) < CLIPPED) & (view.masks.amax(0) < 0.1)
-    usable = plain & view.surfaces.valid
+    usable = reflecting(view.photo, view.masks) & view.surfaces.valid
     if int(usable.sum()) < FEWEST_PIXELS:
         return None
     points = moved(centres.T, first, view.camera).T

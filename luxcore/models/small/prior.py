@@ -129,7 +129,7 @@ def first_guess(
         return FirstGuess(nothing, torch.ones_like(photo), nothing)
     means = irradiance.clamp_max(MOST_IRRADIANCE).flatten(1).mean(1).clamp_min(1e-6)
     field = irradiance / means[:, None, None]
-    usable = (photo.amax(0) < CLIPPED) & (masks.amax(0) < 0.1)
+    usable = reflecting(photo, masks)
     powers = None
     if hints is not None:
         powers = replace(hints.powers, lamps=hints.powers.lamps * means[:, None])
@@ -149,6 +149,11 @@ def first_guess(
     shares = shares * torch.cat([on, on.new_ones(1)]).view(-1, 1, 1, 1)
     shares = shares / shares.sum(0)
     return FirstGuess(shares[:-1], shares[-1], log_ratio)
+
+
+def reflecting(photo: Float[Tensor, "3 h w"], masks: Float[Tensor, "k h w"]) -> Bool[Tensor, "h w"]:
+    """Where the photo tells how bright a surface is that does not glow itself."""
+    return (photo.amax(0) < CLIPPED) & (masks.amax(0) < 0.1)
 
 
 def _strengths(

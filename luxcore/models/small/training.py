@@ -38,6 +38,7 @@ from luxcore.models.small.weights import (
     load_network,
     save_weights,
     shipped_estimator,
+    shipped_network,
     shipped_weights,
 )
 from luxcore.settings.train_mv import TrainMvSettings
@@ -101,9 +102,7 @@ def train_mv(
     single-view weights, whose channels it shares."""
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("mv", base_weights("mv", settings, base), seed)
-    shipped = shipped_weights("sv")
-    single = load_network(shipped, "sv") if shipped.is_file() else None
-    batches = GroupBatches(pool, seed, settings.photos_per_step, single)
+    batches = GroupBatches(pool, seed, settings.photos_per_step, shipped_network("sv"))
     return _train(
         "mv", net, batches, group_cases(aside, seed), settings, out, checkpoint, dataset_dir
     )
@@ -137,8 +136,8 @@ def start_network(kind: str, base: Path | None, seed: int) -> UNet:
         return load_network(base, kind)
     torch.manual_seed(seed)
     net = LampNet(SHAPES[kind])
-    if kind == "mv" and shipped_weights("sv").is_file():
-        widen(load_network(shipped_weights("sv"), "sv"), net)
+    if kind == "mv" and (single := shipped_network("sv")) is not None:
+        widen(single, net)
     return net
 
 

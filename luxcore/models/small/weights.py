@@ -45,8 +45,13 @@ def shipped_weights(kind: str) -> Path:
 
 def shipped_estimator() -> UNet | None:
     """The shipped geometry network; None in a source tree that has none yet."""
-    path = shipped_weights("geometry")
-    return load_network(path, "geometry") if path.is_file() else None
+    return shipped_network("geometry")
+
+
+def shipped_network(kind: str) -> UNet | None:
+    """The shipped network of a kind; None in a source tree that has none yet."""
+    path = shipped_weights(kind)
+    return load_network(path, kind) if path.is_file() else None
 
 
 def save_weights(path: Path, kind: str, shape: NetworkShape, weights: Mapping[str, Tensor]) -> None:
