@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
-from luxcore.models.small.grid import fields_at_full_size, grid_size, masks_to_grid
+from luxcore.models.small.grid import OnGrid, fields_at_full_size, grid_size, masks_to_grid
 from luxcore.models.small.heads import (
     LightFields,
     WarpedLight,
@@ -25,21 +25,23 @@ def random(*shape: int, seed: int = 0) -> torch.Tensor:
 @pytest.mark.parametrize("on", [[True, True, True], [True, False, True], [False, False, False]])
 def test_fractions_sum_to_one_and_lamps_that_are_off_have_none(on: list[bool]) -> None:
     burning = torch.tensor(on)
-    fields = light_fields(3 * random(3, SV_OUTPUTS, 8, 8), burning)
+    fields = light_fields(3 * random(3, SV_OUTPUTS, 8, 8), burning, torch.zeros(3, 8, 8))
     torch.testing.assert_close(fields.fraction.sum(0), torch.ones(3, 8, 8))
     assert (fields.fraction[1:][~burning] == 0).all()
     assert (fields.fraction >= 0).all()
 
 
 def test_no_lamps_leave_everything_to_the_ambient() -> None:
-    fields = light_fields(torch.zeros(0, SV_OUTPUTS, 4, 4), torch.zeros(0, dtype=torch.bool))
+    fields = light_fields(
+        torch.zeros(0, SV_OUTPUTS, 4, 4), torch.zeros(0, dtype=torch.bool), torch.zeros(0, 4, 4)
+    )
     torch.testing.assert_close(fields.fraction, torch.ones(1, 3, 4, 4))
 
 
 def test_lights_of_an_unclipped_photo_add_up_to_it() -> None:
     on = torch.tensor([True, True])
     photo = random(3, 8, 8).abs().clamp(0, 5)
-    fields = light_fields(random(2, SV_OUTPUTS, 8, 8), on)
+    fields = light_fields(random(2, SV_OUTPUTS, 8, 8), on, torch.zeros(2, 8, 8))
     total = fields.fraction[0] * photo + lamp_light(fields, photo, on).sum(0)
     torch.testing.assert_close(total, photo)
 
@@ -49,7 +51,7 @@ def test_a_clipped_emitter_gets_more_light_than_the_photo_shows() -> None:
     photo = torch.full((3, 4, 4), PHOTO_MAX)
     photo[:, :2] = 0.5 * CLIPPED
     outputs = torch.zeros(1, SV_OUTPUTS, 4, 4)
-    fields = light_fields(outputs, on)
+    fields = light_fields(outputs, on, torch.zeros(1, 4, 4))
     light = lamp_light(fields, photo, on)[0] / fields.fraction[1]
     assert (light[:, 2:] > photo[:, 2:] * 1.5).all()
     torch.testing.assert_close(light[:, :2], photo[:, :2])
@@ -59,9 +61,11 @@ def test_a_lamp_that_is_off_can_be_brighter_than_the_photo() -> None:
     on = torch.tensor([False])
     outputs = torch.zeros(1, SV_OUTPUTS, 4, 4)
     outputs[:, 6:9] = 4.0
-    light = lamp_light(light_fields(outputs, on), torch.full((3, 4, 4), 0.1), on)
+    light = lamp_light(
+        light_fields(outputs, on, torch.zeros(1, 4, 4)), torch.full((3, 4, 4), 0.1), on
+    )
     assert (light > 5).all()
-    dark = lamp_light(light_fields(outputs, on), torch.zeros(3, 4, 4), on)
+    dark = lamp_light(light_fields(outputs, on, torch.zeros(1, 4, 4)), torch.zeros(3, 4, 4), on)
     assert (dark > 0.5).all(), "a black pixel can be lit as well"
 
 
@@ -72,7 +76,7 @@ def test_trusted_warped_light_takes_over_and_still_adds_up() -> None:
     known[1] = 0
     outputs = torch.zeros(2, MV_OUTPUTS, 4, 4)
     outputs[:, SV_OUTPUTS:] = 30.0
-    fields = light_fields(outputs, on, WarpedLight(ratio, known))
+    fields = light_fields(outputs, on, torch.zeros(2, 4, 4), WarpedLight(ratio, known))
     torch.testing.assert_close(fields.fraction[1], torch.full((3, 4, 4), 0.3))
     torch.testing.assert_close(fields.fraction[2], torch.full((3, 4, 4), 1 / 3))
     torch.testing.assert_close(fields.fraction.sum(0), torch.ones(3, 4, 4))
@@ -134,7 +138,9 @@ def test_enlarged_fractions_sum_to_one_and_follow_the_photos_edge() -> None:
     lit = torch.nn.functional.interpolate((photo > 1)[None].float(), (32, 32), mode="area")[0]
     fraction = torch.stack([1 - 0.9 * lit, 0.9 * lit])
     fields = LightFields(fraction, torch.zeros(1, 3, 32, 32), torch.zeros(1, 3, 32, 32))
-    full = fields_at_full_size(fields, small, photo, torch.tensor([True]))
+    nothing = torch.zeros(1, 32, 32), torch.zeros(1, 128, 128)
+    grids = OnGrid(small, nothing[0]), OnGrid(photo, nothing[1])
+    full = fields_at_full_size(fields, *grids, torch.tensor([True]))
     torch.testing.assert_close(full.fraction.sum(0), torch.ones(3, 128, 128))
     step = full.fraction[1, 0, 64, 67] - full.fraction[1, 0, 64, 66]
     plain = torch.nn.functional.interpolate(fraction, (128, 128), mode="bilinear")[1, 0, 64]
@@ -145,8 +151,23 @@ def test_a_chequerboard_in_the_ratio_does_not_show() -> None:
     outputs = torch.zeros(1, SV_OUTPUTS, 8, 8)
     outputs[:, 6:9, ::2, ::2] = 1
     outputs[:, 6:9, 1::2, 1::2] = 1
-    ratio = light_fields(outputs, torch.tensor([False])).log_ratio
+    ratio = light_fields(outputs, torch.tensor([False]), torch.zeros(1, 8, 8)).log_ratio
     torch.testing.assert_close(ratio[..., 1:-1, 1:-1], torch.full((1, 3, 6, 6), 0.5))
     outputs[:, 6:9] = 0.7
-    level = light_fields(outputs, torch.tensor([False])).log_ratio
+    level = light_fields(outputs, torch.tensor([False]), torch.zeros(1, 8, 8)).log_ratio
     torch.testing.assert_close(level, torch.full((1, 3, 8, 8), 0.7))
+
+
+def test_what_a_lamp_switched_on_glows_ends_at_its_mask() -> None:
+    photo, masks = torch.full((3, 64, 64), 0.2), torch.zeros(1, 64, 64)
+    masks[:, 21:43, 21:43] = 1
+    coverage = torch.nn.functional.interpolate(masks[None], (16, 16), mode="area")[0]
+    outputs = torch.zeros(1, SV_OUTPUTS, 16, 16)
+    outputs[:, 6:9] = torch.where(coverage > 0.5, 5.0, -1.0)
+    on = torch.tensor([False])
+    fields = light_fields(outputs, on, coverage)
+    grids = OnGrid(photo[:, ::4, ::4], coverage), OnGrid(photo, masks)
+    ratio = fields_at_full_size(fields, *grids, on).log_ratio[0]
+    inside = masks[0] > 0
+    torch.testing.assert_close(ratio[:, inside].min(), torch.tensor(5.0))
+    torch.testing.assert_close(ratio[:, ~inside].max(), torch.tensor(-1.0))

@@ -13,9 +13,7 @@ from numpy.random import PCG64, Generator
 from luxcore.errors import DivergedError
 from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
 from luxcore.models.small.examples import to_example
-from luxcore.models.small.fit import FitSettings, fit, schedule
-from luxcore.models.small.heads import light_fields
-from luxcore.models.small.losses import example_loss
+from luxcore.models.small.fit import FitSettings, fit, lamp_loss, schedule
 from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.scores import mean_psnr
@@ -129,7 +127,7 @@ def test_a_few_steps_lower_the_loss(pool: CropPool) -> None:
     net = tiny("sv")
 
     def loss() -> torch.Tensor:
-        terms = [example_loss(light_fields(net(f), e.on), e) for f, e in batch]
+        terms = [lamp_loss(net(f), e) for f, e in batch]
         return torch.stack(terms).mean()
 
     optimizer = torch.optim.AdamW(net.parameters(), 3e-3)
@@ -147,7 +145,7 @@ def test_gradients_reach_every_weight(pool: CropPool) -> None:
     for parameter in net.parameters():
         torch.nn.init.normal_(parameter, std=0.05)
     for features, example in GroupBatches(pool, 5, photos=4).batch(0):
-        example_loss(light_fields(net(features), example.on, example.warped), example).backward()
+        lamp_loss(net(features), example).backward()
     silent = [name for name, p in net.named_parameters() if not (p.grad != 0).any()]
     assert not silent
 

@@ -156,9 +156,10 @@ def _predicted(
     light = torch.zeros_like(example.lights)
     if bool(seen.any()):
         on = example.on[seen]
-        features = lamp_features(example.photo, example.masks[seen], on, example.surfaces)
+        masks = example.masks[seen]
+        features = lamp_features(example.photo, masks, on, example.surfaces)
         with torch.no_grad():
-            fields = light_fields(single(features), on)
+            fields = light_fields(single(features), on, masks)
         light[seen] = lamp_light(fields, example.photo, on)
     return light
 

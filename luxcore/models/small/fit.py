@@ -36,7 +36,8 @@ Validate = Callable[[UNet], dict[str, float]]
 
 def lamp_loss(outputs: Tensor, example: Example) -> Tensor:
     """The loss of the lamp networks."""
-    return example_loss(light_fields(outputs, example.on, example.warped), example)
+    fields = light_fields(outputs, example.on, example.masks, example.warped)
+    return example_loss(fields, example)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from luxcore.models.small.geometry import (
 from luxcore.models.small.network import NetworkShape, UNet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.surfaces import Surfaces
-from luxcore.models.small.training import WIDTHS, fit_settings, pools
+from luxcore.models.small.training import WIDTHS, base_weights, fit_settings, pools
 from luxcore.models.small.weights import load_network, save_weights
 from luxcore.settings.train_sv import TrainingSettings
 
@@ -84,11 +84,12 @@ def train_geometry(
     checkpoint: Path | None = None,
 ) -> dict[str, float]:
     """Train on the rendered views below `dataset_dir`; writes `model.safetensors` and `curve.json`
-    into `out` and returns the scores on photos kept aside. `settings.base` is a file or None.
+    into `out` and returns the scores on photos kept aside.
     """
     pool, aside = pools(dataset_dir, settings, seed)
     torch.manual_seed(seed)
-    net = load_network(Path(settings.base), "geometry") if settings.base else UNet(SHAPE)
+    base = base_weights("geometry", settings, None)
+    net = UNet(SHAPE) if base is None else load_network(base, "geometry")
     rng = Generator(PCG64(SeedSequence((seed, 2))))
     cases = [seen_photo(relit([crop], rng)[0]) for crop in aside.photos()]
     batches = PhotoBatches(pool, seed, settings.photos_per_step)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 import torch.nn.functional as fn
@@ -17,6 +19,17 @@ from luxcore.models.small.surfaces import Surfaces, surfaces_of
 GUIDE_RADIUS = 2
 GUIDE_SMOOTHNESS = 0.05
 """Variance of the guide (in stops/4, squared) below which a patch counts as flat."""
+
+EDGE_COVERAGE = 0.25
+"""From this share of a mask on a place of the grid tells nothing of what lies around the lamp."""
+
+
+@dataclass(frozen=True)
+class OnGrid:
+    """A photo and the coverage (0..1) of its lamps' masks at one resolution."""
+
+    photo: Float[Tensor, "3 h w"]
+    masks: Float[Tensor, "k h w"]
 
 
 def grid_size(height: int, width: int, long_side: int, stride: int) -> tuple[int, int]:
@@ -68,19 +81,17 @@ def geometry_to_grid(geometry: Geometry | None, size: tuple[int, int]) -> Surfac
 
 
 def fields_at_full_size(
-    fields: LightFields,
-    photo_small: Float[Tensor, "3 y x"],
-    photo: Float[Tensor, "3 h w"],
-    on: Bool[Tensor, " k"],
+    fields: LightFields, small: OnGrid, full: OnGrid, on: Bool[Tensor, " k"]
 ) -> LightFields:
     """Light fields of the grid at the photo's size, with edges where the photo has them.
 
     A fast guided filter (He and Sun 2015): in every window a field is a line of the guide, and the
     line's two coefficients are what is enlarged. Fractions are brought back to a sum of exactly 1.
     """
-    if photo_small.shape == photo.shape:
+    photo = full.photo
+    if small.photo.shape == photo.shape:
         return fields
-    guide_small, guide = _guide(photo_small), _guide(photo)
+    guide_small, guide = _guide(small.photo), _guide(photo)
     height, width = photo.shape[1:]
     fraction = _guided(fields.fraction, guide_small, guide).clamp_min(0)
     nothing = fields.log_ratio.new_zeros(1, 1, 1, 1).expand(len(on), 3, height, width)
@@ -89,9 +100,34 @@ def fields_at_full_size(
     glowing = bool(on.any()) and bool((photo.amax(0) > CLIPPED).any())
     return LightFields(
         fraction / fraction.sum(0, keepdim=True).clamp_min(1e-6),
-        _guided(fields.log_ratio, guide_small, guide) if unlit else nothing,
+        _ratio_at_full_size(fields.log_ratio, small, full) if unlit else nothing,
         _enlarged(fields.log_boost, (height, width)) if glowing else nothing,
     )
+
+
+def _ratio_at_full_size(
+    log_ratio: Float[Tensor, "k 3 y x"], small: OnGrid, full: OnGrid
+) -> Float[Tensor, "k 3 h w"]:
+    """Enlarged inside and outside of each lamp's mask apart: what glows ends where its mask does,
+    and nothing of it spills onto the wall."""
+    covered = (small.masks > 0.5)[:, None].to(log_ratio)
+    touched = (small.masks > EDGE_COVERAGE)[:, None].to(log_ratio)
+    surroundings = _filled(log_ratio, 1 - touched)
+    ratio = _guided(surroundings, _guide(small.photo), _guide(full.photo))
+    for lamp, glow in enumerate(_filled(log_ratio, covered)):
+        inside = full.masks[lamp] > 0.5
+        ratio[lamp][:, inside] = _enlarged(glow[None], inside.shape)[0][:, inside]
+    return ratio
+
+
+def _filled(
+    field: Float[Tensor, "k 3 y x"], known: Float[Tensor, "k 1 y x"]
+) -> Float[Tensor, "k 3 y x"]:
+    """The field with what is not `known` (0 or 1) taken from its neighbours that are; as it was
+    where none is near."""
+    weight = _box(known)
+    nearby = _box(field * known) / weight.clamp_min(1e-6)
+    return torch.where((known > 0) | (weight <= 0), field, nearby)
 
 
 def _guide(photo: Tensor) -> Tensor:

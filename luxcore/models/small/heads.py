@@ -54,14 +54,17 @@ class WarpedLight:
 
 
 def light_fields(
-    outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"], warped: WarpedLight | None = None
+    outputs: Float[Tensor, "k o h w"],
+    on: Bool[Tensor, " k"],
+    masks: Float[Tensor, "k h w"],
+    warped: WarpedLight | None = None,
 ) -> LightFields:
-    """The heads of all lamps of one photo, brought together.
+    """The heads of all lamps of one photo, whose coverage is `masks`, brought together.
 
     With `warped`, the 13th output says how far to trust it, and the answer lies between the
     network's own and the warped one.
     """
-    own = _own_fields(outputs[:, :SV_OUTPUTS].float(), on)
+    own = _own_fields(outputs[:, :SV_OUTPUTS].float(), on, masks)
     if warped is None or outputs.shape[1] == SV_OUTPUTS or not len(outputs):
         return own
     # Trust starts high (0.88): what another view shows of a diffuse surface is nearly the truth.
@@ -78,7 +81,9 @@ def light_fields(
     )
 
 
-def _own_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> LightFields:
+def _own_fields(
+    outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"], masks: Float[Tensor, "k h w"]
+) -> LightFields:
     lamp, ambient, ratio, boost = outputs.chunk(4, dim=1)
     # Each lamp's pass has its own view of the ambient; the burning lamps' mean speaks for it.
     ambient = (
@@ -90,14 +95,29 @@ def _own_fields(outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"]) -> Li
     logits = torch.cat([ambient, lamp.masked_fill(off, float("-inf"))])
     return LightFields(
         logits.softmax(dim=0),
-        _smoothed(ratio).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
+        smoothed_aside(ratio, masks).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
         MAX_LOG_BOOST * torch.sigmoid(boost - 2),
     )
 
 
-def _smoothed(field: Float[Tensor, "k 3 h w"]) -> Float[Tensor, "k 3 h w"]:
-    """Binomial over 3×3: the network's last upsampling leaves a chequerboard of two pixels, which a
-    ratio, that no softmax bounds, would show."""
+def smoothed_aside(
+    field: Float[Tensor, "k 3 h w"], masks: Float[Tensor, "k h w"]
+) -> Float[Tensor, "k 3 h w"]:
+    """Smoothed over 3×3 inside and outside of each lamp's mask apart: a lamp that is switched on
+    glows to its edge and no farther.
+
+    The network's last upsampling leaves a chequerboard of two pixels, which a ratio, that no
+    softmax bounds, would show.
+    """
+    inside = (masks > 0.5).to(field)[:, None].expand_as(field)
+    return inside * _smoothed(field, inside) + (1 - inside) * _smoothed(field, 1 - inside)
+
+
+def _smoothed(field: Float[Tensor, "k 3 h w"], counted: Float[Tensor, "k 3 h w"]) -> Tensor:
+    return _binomial(field * counted) / _binomial(counted).clamp_min(1e-6)
+
+
+def _binomial(field: Float[Tensor, "k 3 h w"]) -> Float[Tensor, "k 3 h w"]:
     taps = field.new_tensor([0.25, 0.5, 0.25])
     kernel = (taps[:, None] * taps)[None, None]
     planes = fn.pad(field.flatten(0, 1)[:, None], (1, 1, 1, 1), mode="replicate")

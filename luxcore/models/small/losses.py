@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.small.examples import Example
@@ -17,8 +17,13 @@ SCORE_WEIGHT = 0.1
 """Of the logarithm of the squared error, by which results are judged: an easy lamp counts as much
 as a hard one."""
 
+OFF_SCORE_WEIGHT = 0.3
 OFF_WEIGHT = 0.08
-"""Of the plain error of lamps that are off in the photo: nobody can know how bright they are."""
+"""Of the score and of the plain error of lamps that are off in the photo. The second is small:
+nobody can know how bright they are. The first is not, since nothing else teaches them."""
+
+GLOW_WEIGHT = 0.02
+"""Of what the emitters themselves send, in natural logs."""
 
 ERROR_FLOOR = 3e-4
 """Squared error below which nothing is gained: 35 dB."""
@@ -34,12 +39,15 @@ def example_loss(fields: LightFields, example: Example) -> Tensor:
         terms.append(_seen_error(lit, truth))
         terms.append(0.5 * _one_light_off_error(fields, example))
         terms.append(0.2 * _fraction_error(fields, example))
-        terms.append(0.02 * _boost_error(lit, truth, example))
+        clipped = (example.photo.amax(0) > CLIPPED) & (example.masks[on] > 0.5)
+        terms.append(GLOW_WEIGHT * _glow_error(lit, truth, clipped))
         terms.append(SCORE_WEIGHT * _score_error(lit, truth))
     if bool((~on).any()):
         share = float((~on).float().mean())
-        terms.append(share * SCORE_WEIGHT * _score_error(light[~on], example.lights[~on]))
-        terms.append(share * OFF_WEIGHT * _seen_error(light[~on], example.lights[~on]))
+        lit, truth = light[~on], example.lights[~on]
+        terms.append(share * OFF_SCORE_WEIGHT * _score_error(lit, truth))
+        terms.append(share * OFF_WEIGHT * _seen_error(lit, truth))
+        terms.append(share * GLOW_WEIGHT * _glow_error(lit, truth, example.masks[~on] > 0.5))
     return torch.stack(terms).sum() if terms else fields.fraction.sum() * 0
 
 
@@ -73,11 +81,14 @@ def _fraction_error(fields: LightFields, example: Example) -> Tensor:
     return (fields.fraction[keep] - truth).abs().mean()
 
 
-def _boost_error(predicted: Tensor, truth: Tensor, example: Example) -> Tensor:
-    """Mean error of a lamp's own clipped emitter, in natural logs: no bracket shows it all."""
-    clipped = (example.photo.amax(0) > CLIPPED) & (example.masks[example.on] > 0.5)
+def _glow_error(
+    predicted: Float[Tensor, "k 3 h w"],
+    truth: Float[Tensor, "k 3 h w"],
+    emitters: Bool[Tensor, "k h w"],
+) -> Tensor:
+    """Mean error of what lamps themselves send, in natural logs: no bracket shows it all."""
     difference = torch.log(predicted + 1).mean(1) - torch.log(truth + 1).mean(1)
-    return (difference.abs() * clipped).sum() / clipped.sum().clamp_min(1)
+    return (difference.abs() * emitters).sum() / emitters.sum().clamp_min(1)
 
 
 def _score_error(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:

@@ -14,6 +14,7 @@ from luxcore.cameras import Camera
 from luxcore.errors import InputError
 from luxcore.models.interface import MAX_VIEWS_PER_PASS, Decomposition, Reference, View
 from luxcore.models.small.grid import (
+    OnGrid,
     geometry_to_grid,
     grid_size,
     masks_to_grid,
@@ -65,8 +66,9 @@ class SmallHarmonizer:
         index = torch.from_numpy(heard_of)
         on = target.on[index]
         warped = WarpedLight(warped.ratio[index], warped.known[index])
-        fields = run_network(self.net, features[index], on, warped)
-        part = finish(fields, target.photo, view.image_linear, view.masks[heard_of], on)
+        small = OnGrid(target.photo, target.masks[index])
+        fields = run_network(self.net, features[index], on, small.masks, warped)
+        part = finish(fields, small, view.image_linear, view.masks[heard_of], on)
         return part if heard_of.all() else with_unseen(part, heard_of)
 
     def _known_light(self, reference: Reference) -> KnownLight | None:

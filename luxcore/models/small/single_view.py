@@ -15,6 +15,7 @@ from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
 from luxcore.models.small.grid import (
+    OnGrid,
     fields_at_full_size,
     geometry_to_grid,
     grid_size,
@@ -47,10 +48,10 @@ class SmallDecomposer:
         seed: int,
     ) -> Decomposition:
         """See `luxcore.models.interface.Decomposer`; `seed` changes nothing here."""
-        seen = masks.any((1, 2))
-        if not seen.all():
-            part = self.decompose(image_linear, masks[seen], on[seen], geometry, seed)
-            return with_unseen(part, seen)
+        shown = masks.any((1, 2))
+        if not shown.all():
+            part = self.decompose(image_linear, masks[shown], on[shown], geometry, seed)
+            return with_unseen(part, shown)
         height, width = image_linear.shape[:2]
         size = grid_size(height, width, self.long_side_px, self._stride())
         small = photo_to_grid(image_linear, size)
@@ -58,9 +59,10 @@ class SmallDecomposer:
         surfaces = geometry_to_grid(geometry, size)
         if surfaces is None and self.estimator is not None:
             surfaces = estimate_surfaces(self.estimator, small)
-        features = lamp_features(small, masks_to_grid(masks, size), burning, surfaces)
-        fields = run_network(self.net, features, burning)
-        return finish(fields, small, image_linear, masks, burning)
+        seen = OnGrid(small, masks_to_grid(masks, size))
+        features = lamp_features(small, seen.masks, burning, surfaces)
+        fields = run_network(self.net, features, burning, seen.masks)
+        return finish(fields, seen, image_linear, masks, burning)
 
     def _stride(self) -> int:
         """Sides of the grid are multiples of what both networks need."""
@@ -71,19 +73,20 @@ def run_network(
     net: UNet,
     features: Float[Tensor, "k c y x"],
     on: Bool[Tensor, " k"],
+    masks: Float[Tensor, "k y x"],
     warped: WarpedLight | None = None,
 ) -> LightFields:
     """The light fields of one photo on the grid; K = 0 needs no network."""
     if not len(features):
-        return light_fields(features.new_zeros(0, SV_OUTPUTS, *features.shape[-2:]), on)
+        return light_fields(features.new_zeros(0, SV_OUTPUTS, *features.shape[-2:]), on, masks)
     with torch.inference_mode():
         outputs = net(features.contiguous(memory_format=torch.channels_last))
-    return light_fields(outputs.clone(), on, warped)
+    return light_fields(outputs.clone(), on, masks, warped)
 
 
 def finish(
     fields: LightFields,
-    photo_small: Float[Tensor, "3 y x"],
+    small: OnGrid,
     image_linear: Float[np.ndarray, "h w 3"],
     masks: Bool[np.ndarray, "k h w"],
     on: Bool[Tensor, " k"],
@@ -94,9 +97,9 @@ def finish(
     own light stays. Scales are 1 for lamps that are on: `olat` is then the lamp's share itself.
     """
     photo = chw(image_linear).clamp_min(0)
-    fields = fields_at_full_size(fields, photo_small, photo, on)
-    lights, ambient = lamp_light(fields, photo, on), fields.fraction[0] * photo
     covered = torch.from_numpy(masks)
+    fields = fields_at_full_size(fields, small, OnGrid(photo, covered.float()), on)
+    lights, ambient = lamp_light(fields, photo, on), fields.fraction[0] * photo
     lights, ambient = keep_out_of_emitters(lights, ambient, emitter_masks(photo, covered), on)
     scale = on.float()[:, None].expand(-1, 3)
     return Decomposition(_hwc(ambient), _hwc(lights), scale.numpy().copy())
