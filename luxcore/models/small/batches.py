@@ -12,6 +12,7 @@ from numpy.random import PCG64, Generator, SeedSequence
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
+from luxcore.data.grading import graded
 from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
@@ -27,8 +28,9 @@ from luxcore.models.small.samples import CropPool
 class SingleBatches:
     """Single photos of `pool`, newly lit each time, half of them mirrored.
 
-    `repaint` is the share of photos whose surfaces get other colours, `geometry` the share that
-    comes with true depth and normals; for the rest `estimator` guesses them, where there is one.
+    `repaint` is the share of photos whose surfaces get other colours, `grade` the share finished as
+    by another camera, `geometry` the share that comes with true depth and normals; for the rest
+    `estimator` guesses them, where there is one.
     """
 
     pool: CropPool
@@ -37,6 +39,7 @@ class SingleBatches:
     geometry: float = 0.5
     estimator: UNet | None = None
     repaint: float = 0.6
+    grade: float = 0.3
 
     def batch(self, step: int) -> list[tuple[Tensor, Example]]:
         """`photos` examples with the features of their lamps; photos that show no lamp are passed
@@ -45,8 +48,12 @@ class SingleBatches:
         found: list[tuple[Tensor, Example]] = []
         while len(found) < self.photos:
             (crop,) = self.pool.relit(rng, 1)
+            if rng.random() < self.repaint:
+                crop = repainted(crop, rng)
+            if rng.random() < self.grade:
+                crop = graded(crop, rng)
             example = to_example(
-                repainted(crop, rng) if rng.random() < self.repaint else crop,
+                crop,
                 geometry=bool(rng.random() < self.geometry),
                 flip=bool(rng.random() < 0.5),
             )
