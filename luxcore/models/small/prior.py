@@ -129,11 +129,10 @@ def first_guess(
         return FirstGuess(nothing, torch.ones_like(photo), nothing)
     means = irradiance.clamp_max(MOST_IRRADIANCE).flatten(1).mean(1).clamp_min(1e-6)
     field = irradiance / means[:, None, None]
-    usable = reflecting(photo, masks)
     powers = None
     if hints is not None:
         powers = replace(hints.powers, lamps=hints.powers.lamps * means[:, None])
-    strengths, ambient = _strengths(photo, field, usable, on, powers)
+    strengths, ambient = _strengths(photo, field, reflecting(photo, masks), on, powers)
     burning = field[:, None] * (strengths * on[:, None])[:, :, None, None]
     level = ambient.view(1, 3, 1, 1).expand_as(burning[:1])
     sent = (burning.sum(0) + level[0]).clamp_min(1e-9)
@@ -141,7 +140,16 @@ def first_guess(
     told = on if powers is None else on | powers.known
     strengths = torch.where(told[:, None], strengths, sent.mean((1, 2)))
     log_ratio = torch.log(field[:, None] * strengths[:, :, None, None] / sent + SHARE_FLOOR)
-    shares = torch.cat([burning, level]) / sent + SHARE_FLOOR
+    return _corrected(torch.cat([burning, level]) / sent + SHARE_FLOOR, log_ratio, on, hints)
+
+
+def _corrected(
+    shares: Float[Tensor, "k1 3 h w"],
+    log_ratio: Float[Tensor, "k 3 h w"],
+    on: Bool[Tensor, " k"],
+    hints: Hints | None,
+) -> FirstGuess:
+    """Shares of lamps and, last, of the ambient that sum to 1, as far as hints or doubt go."""
     if hints is None:
         shares = shares**FITTED_WEIGHT
     elif hints.log_shares is not None and hints.log_ratio is not None:
