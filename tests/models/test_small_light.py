@@ -7,9 +7,11 @@ import pytest
 import torch
 
 from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
-from luxcore.models.small.grid import OnGrid, fields_at_full_size, grid_size, masks_to_grid
+from luxcore.models.small.grid import fields_at_full_size, grid_size, masks_to_grid
 from luxcore.models.small.heads import (
+    GLOW,
     LightFields,
+    OnGrid,
     WarpedLight,
     lamp_light,
     light_fields,
@@ -22,10 +24,15 @@ def random(*shape: int, seed: int = 0) -> torch.Tensor:
     return torch.randn(*shape, generator=torch.Generator().manual_seed(seed))
 
 
+def unseen(lamps: int, size: int) -> OnGrid:
+    """A grey photo whose lamps' masks are empty."""
+    return OnGrid(torch.full((3, size, size), 0.2), torch.zeros(lamps, size, size))
+
+
 @pytest.mark.parametrize("on", [[True, True, True], [True, False, True], [False, False, False]])
 def test_fractions_sum_to_one_and_lamps_that_are_off_have_none(on: list[bool]) -> None:
     burning = torch.tensor(on)
-    fields = light_fields(3 * random(3, SV_OUTPUTS, 8, 8), burning, torch.zeros(3, 8, 8))
+    fields = light_fields(3 * random(3, SV_OUTPUTS, 8, 8), burning, unseen(3, 8))
     torch.testing.assert_close(fields.fraction.sum(0), torch.ones(3, 8, 8))
     assert (fields.fraction[1:][~burning] == 0).all()
     assert (fields.fraction >= 0).all()
@@ -33,7 +40,7 @@ def test_fractions_sum_to_one_and_lamps_that_are_off_have_none(on: list[bool]) -
 
 def test_no_lamps_leave_everything_to_the_ambient() -> None:
     fields = light_fields(
-        torch.zeros(0, SV_OUTPUTS, 4, 4), torch.zeros(0, dtype=torch.bool), torch.zeros(0, 4, 4)
+        torch.zeros(0, SV_OUTPUTS, 4, 4), torch.zeros(0, dtype=torch.bool), unseen(0, 4)
     )
     torch.testing.assert_close(fields.fraction, torch.ones(1, 3, 4, 4))
 
@@ -41,7 +48,7 @@ def test_no_lamps_leave_everything_to_the_ambient() -> None:
 def test_lights_of_an_unclipped_photo_add_up_to_it() -> None:
     on = torch.tensor([True, True])
     photo = random(3, 8, 8).abs().clamp(0, 5)
-    fields = light_fields(random(2, SV_OUTPUTS, 8, 8), on, torch.zeros(2, 8, 8))
+    fields = light_fields(random(2, SV_OUTPUTS, 8, 8), on, unseen(2, 8))
     total = fields.fraction[0] * photo + lamp_light(fields, photo, on).sum(0)
     torch.testing.assert_close(total, photo)
 
@@ -51,7 +58,7 @@ def test_a_clipped_emitter_gets_more_light_than_the_photo_shows() -> None:
     photo = torch.full((3, 4, 4), PHOTO_MAX)
     photo[:, :2] = 0.5 * CLIPPED
     outputs = torch.zeros(1, SV_OUTPUTS, 4, 4)
-    fields = light_fields(outputs, on, torch.zeros(1, 4, 4))
+    fields = light_fields(outputs, on, unseen(1, 4))
     light = lamp_light(fields, photo, on)[0] / fields.fraction[1]
     assert (light[:, 2:] > photo[:, 2:] * 1.5).all()
     torch.testing.assert_close(light[:, :2], photo[:, :2])
@@ -61,11 +68,9 @@ def test_a_lamp_that_is_off_can_be_brighter_than_the_photo() -> None:
     on = torch.tensor([False])
     outputs = torch.zeros(1, SV_OUTPUTS, 4, 4)
     outputs[:, 6:9] = 4.0
-    light = lamp_light(
-        light_fields(outputs, on, torch.zeros(1, 4, 4)), torch.full((3, 4, 4), 0.1), on
-    )
+    light = lamp_light(light_fields(outputs, on, unseen(1, 4)), torch.full((3, 4, 4), 0.1), on)
     assert (light > 5).all()
-    dark = lamp_light(light_fields(outputs, on, torch.zeros(1, 4, 4)), torch.zeros(3, 4, 4), on)
+    dark = lamp_light(light_fields(outputs, on, unseen(1, 4)), torch.zeros(3, 4, 4), on)
     assert (dark > 0.5).all(), "a black pixel can be lit as well"
 
 
@@ -76,7 +81,7 @@ def test_trusted_warped_light_takes_over_and_still_adds_up() -> None:
     known[1] = 0
     outputs = torch.zeros(2, MV_OUTPUTS, 4, 4)
     outputs[:, SV_OUTPUTS:] = 30.0
-    fields = light_fields(outputs, on, torch.zeros(2, 4, 4), WarpedLight(ratio, known))
+    fields = light_fields(outputs, on, unseen(2, 4), WarpedLight(ratio, known))
     torch.testing.assert_close(fields.fraction[1], torch.full((3, 4, 4), 0.3))
     torch.testing.assert_close(fields.fraction[2], torch.full((3, 4, 4), 1 / 3))
     torch.testing.assert_close(fields.fraction.sum(0), torch.ones(3, 4, 4))
@@ -151,23 +156,24 @@ def test_a_chequerboard_in_the_ratio_does_not_show() -> None:
     outputs = torch.zeros(1, SV_OUTPUTS, 8, 8)
     outputs[:, 6:9, ::2, ::2] = 1
     outputs[:, 6:9, 1::2, 1::2] = 1
-    ratio = light_fields(outputs, torch.tensor([False]), torch.zeros(1, 8, 8)).log_ratio
+    ratio = light_fields(outputs, torch.tensor([False]), unseen(1, 8)).log_ratio
     torch.testing.assert_close(ratio[..., 1:-1, 1:-1], torch.full((1, 3, 6, 6), 0.5))
     outputs[:, 6:9] = 0.7
-    level = light_fields(outputs, torch.tensor([False]), torch.zeros(1, 8, 8)).log_ratio
+    level = light_fields(outputs, torch.tensor([False]), unseen(1, 8)).log_ratio
     torch.testing.assert_close(level, torch.full((1, 3, 8, 8), 0.7))
 
 
-def test_what_a_lamp_switched_on_glows_ends_at_its_mask() -> None:
+def test_a_lamp_switched_on_glows_to_the_edge_of_its_mask() -> None:
     photo, masks = torch.full((3, 64, 64), 0.2), torch.zeros(1, 64, 64)
     masks[:, 21:43, 21:43] = 1
     coverage = torch.nn.functional.interpolate(masks[None], (16, 16), mode="area")[0]
     outputs = torch.zeros(1, SV_OUTPUTS, 16, 16)
     outputs[:, 6:9] = torch.where(coverage > 0.5, 5.0, -1.0)
-    on = torch.tensor([False])
-    fields = light_fields(outputs, on, coverage)
-    grids = OnGrid(photo[:, ::4, ::4], coverage), OnGrid(photo, masks)
-    ratio = fields_at_full_size(fields, *grids, on).log_ratio[0]
+    on, small = torch.tensor([False]), OnGrid(photo[:, ::4, ::4], coverage)
+    fields = light_fields(outputs, on, small)
+    light = lamp_light(fields_at_full_size(fields, small, OnGrid(photo, masks), on), photo, on)[0]
     inside = masks[0] > 0
-    torch.testing.assert_close(ratio[:, inside].min(), torch.tensor(5.0))
-    torch.testing.assert_close(ratio[:, ~inside].max(), torch.tensor(-1.0))
+    wall = 0.22 * np.exp(-1.0)
+    torch.testing.assert_close(light[:, ~inside], torch.full_like(light[:, ~inside], wall))
+    glow = wall * np.exp(GLOW)
+    torch.testing.assert_close(light[:, inside], torch.full_like(light[:, inside], glow))

@@ -17,7 +17,7 @@ from luxcore.data.repaint import repainted
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
-from luxcore.models.small.heads import lamp_light, light_fields
+from luxcore.models.small.heads import OnGrid, lamp_light, light_fields
 from luxcore.models.small.hints import KnownLight, references_of
 from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
@@ -163,10 +163,10 @@ def _predicted(
     light = torch.zeros_like(example.lights)
     if bool(seen.any()):
         on = example.on[seen]
-        masks = example.masks[seen]
-        features = lamp_features(example.photo, masks, on, example.surfaces)
+        shown = OnGrid(example.photo, example.masks[seen])
+        features = lamp_features(shown.photo, shown.masks, on, example.surfaces)
         with torch.no_grad():
-            fields = light_fields(single(features), on, masks)
+            fields = light_fields(single(features), on, shown)
         light[seen] = lamp_light(fields, example.photo, on)
     return light
 

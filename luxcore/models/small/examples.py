@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
-from luxcore.models.small.heads import WarpedLight
+from luxcore.models.small.heads import OnGrid, WarpedLight
 from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
@@ -35,6 +35,11 @@ class Example:
     ambient: Float[Tensor, "3 h w"]
     warped: WarpedLight | None = None
     """Light of references, for the multi-view model."""
+
+    @property
+    def seen(self) -> OnGrid:
+        """What the heads are told."""
+        return OnGrid(self.photo, self.masks)
 
 
 def to_example(

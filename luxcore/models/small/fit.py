@@ -36,7 +36,7 @@ Validate = Callable[[UNet], dict[str, float]]
 
 def lamp_loss(outputs: Tensor, example: Example) -> Tensor:
     """The loss of the lamp networks."""
-    fields = light_fields(outputs, example.on, example.masks, example.warped)
+    fields = light_fields(outputs, example.on, example.seen, example.warped)
     return example_loss(fields, example)
 
 

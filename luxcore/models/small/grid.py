@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 import torch.nn.functional as fn
@@ -11,7 +9,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.interface import Geometry
-from luxcore.models.small.heads import LightFields
+from luxcore.models.small.heads import LightFields, OnGrid
 from luxcore.models.small.levels import CLIPPED, PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
@@ -22,14 +20,6 @@ GUIDE_SMOOTHNESS = 0.05
 
 EDGE_COVERAGE = 0.25
 """From this share of a mask on a place of the grid tells nothing of what lies around the lamp."""
-
-
-@dataclass(frozen=True)
-class OnGrid:
-    """A photo and the coverage (0..1) of its lamps' masks at one resolution."""
-
-    photo: Float[Tensor, "3 h w"]
-    masks: Float[Tensor, "k h w"]
 
 
 def grid_size(height: int, width: int, long_side: int, stride: int) -> tuple[int, int]:

@@ -2,9 +2,12 @@
 
 The photo is split, not repainted: every lamp that is on, and the ambient rest, gets an RGB fraction
 of each pixel, and the fractions sum to 1 (softmax over lamps and ambient). So texture stays exact
-and OLATs, one-light-off pictures and all brackets agree. A lamp that is off has no fraction: its
-light is the photo times an unbounded ratio. Where the photo is clipped, a boost restores what
-the lamp sent beyond it.
+and OLATs, one-light-off pictures and all brackets agree. Where the photo is clipped, a boost
+restores what the lamp sent beyond it.
+
+A lamp that is off has no fraction: its light is the photo times an unbounded ratio. How it will
+glow itself does not show in the photo, but follows from the light that it sends: a lamp's own
+mask is GLOW brighter, more or less, than what it lights up.
 """
 
 from __future__ import annotations
@@ -27,6 +30,20 @@ MAX_LOG_BOOST = 6.0
 
 RATIO_FLOOR = 0.02
 """Added to the photo before the ratio multiplies it: black pixels can be lit as well."""
+
+
+GLOW = 4.0
+"""Natural log of a burning lamp's own light (nine tenths of its mask are darker) over the root mean
+square of what it sends to the rest of a photo: the mean over the training rooms' lamps, with a
+standard deviation of 1.5."""
+
+
+@dataclass(frozen=True)
+class OnGrid:
+    """A photo and the coverage (0..1) of its lamps' masks at one resolution."""
+
+    photo: Float[Tensor, "3 h w"]
+    masks: Float[Tensor, "k h w"]
 
 
 @dataclass(frozen=True)
@@ -56,15 +73,15 @@ class WarpedLight:
 def light_fields(
     outputs: Float[Tensor, "k o h w"],
     on: Bool[Tensor, " k"],
-    masks: Float[Tensor, "k h w"],
+    small: OnGrid,
     warped: WarpedLight | None = None,
 ) -> LightFields:
-    """The heads of all lamps of one photo, whose coverage is `masks`, brought together.
+    """The heads of all lamps of one photo, `small` as the network sees it, brought together.
 
     With `warped`, the 13th output says how far to trust it, and the answer lies between the
     network's own and the warped one.
     """
-    own = _own_fields(outputs[:, :SV_OUTPUTS].float(), on, masks)
+    own = _own_fields(outputs[:, :SV_OUTPUTS].float(), on, small)
     if warped is None or outputs.shape[1] == SV_OUTPUTS or not len(outputs):
         return own
     # Trust starts high (0.88): what another view shows of a diffuse surface is nearly the truth.
@@ -82,7 +99,7 @@ def light_fields(
 
 
 def _own_fields(
-    outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"], masks: Float[Tensor, "k h w"]
+    outputs: Float[Tensor, "k o h w"], on: Bool[Tensor, " k"], small: OnGrid
 ) -> LightFields:
     lamp, ambient, ratio, boost = outputs.chunk(4, dim=1)
     # Each lamp's pass has its own view of the ambient; the burning lamps' mean speaks for it.
@@ -93,28 +110,38 @@ def _own_fields(
     )
     off = ~on.view(-1, 1, 1, 1)
     logits = torch.cat([ambient, lamp.masked_fill(off, float("-inf"))])
+    outside = (small.masks <= 0.5).to(ratio)[:, None].expand_as(ratio)
     return LightFields(
         logits.softmax(dim=0),
-        smoothed_aside(ratio, masks).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO),
+        _glowing(_smoothed(ratio, outside), outside, boost, small),
         MAX_LOG_BOOST * torch.sigmoid(boost - 2),
     )
 
 
-def smoothed_aside(
-    field: Float[Tensor, "k 3 h w"], masks: Float[Tensor, "k h w"]
+def _smoothed(
+    field: Float[Tensor, "k 3 h w"], counted: Float[Tensor, "k 3 h w"]
 ) -> Float[Tensor, "k 3 h w"]:
-    """Smoothed over 3×3 inside and outside of each lamp's mask apart: a lamp that is switched on
-    glows to its edge and no farther.
-
-    The network's last upsampling leaves a chequerboard of two pixels, which a ratio, that no
-    softmax bounds, would show.
-    """
-    inside = (masks > 0.5).to(field)[:, None].expand_as(field)
-    return inside * _smoothed(field, inside) + (1 - inside) * _smoothed(field, 1 - inside)
-
-
-def _smoothed(field: Float[Tensor, "k 3 h w"], counted: Float[Tensor, "k 3 h w"]) -> Tensor:
+    """Smoothed over 3×3 of what is `counted` (0 or 1): the network's last upsampling leaves a
+    chequerboard of two pixels, which a ratio, that no softmax bounds, would show."""
     return _binomial(field * counted) / _binomial(counted).clamp_min(1e-6)
+
+
+def _glowing(
+    log_ratio: Float[Tensor, "k 3 h w"],
+    outside: Float[Tensor, "k 3 h w"],
+    glow: Float[Tensor, "k 3 h w"],
+    small: OnGrid,
+) -> Float[Tensor, "k 3 h w"]:
+    """The ratio as it is `outside` of each lamp's mask, and inside what makes the lamp `glow`."""
+    log_ratio = log_ratio.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+    photo = small.photo + RATIO_FLOOR
+    # Other lamps' emitters are no measure of what this one lights up.
+    counted = (small.masks <= 0.5).all(0).to(photo).expand_as(photo)
+    sent = (photo * torch.exp(log_ratio)) ** 2 * counted
+    mean_square = sent.sum((2, 3)) / counted.sum((1, 2)).clamp_min(1)
+    level = 0.5 * torch.log(mean_square + 1e-9)[..., None, None]
+    inside = level + GLOW + glow - torch.log(photo)
+    return torch.where(outside > 0, log_ratio, inside.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO))
 
 
 def _binomial(field: Float[Tensor, "k 3 h w"]) -> Float[Tensor, "k 3 h w"]:

@@ -14,14 +14,13 @@ from luxcore.cameras import Camera
 from luxcore.errors import InputError
 from luxcore.models.interface import MAX_VIEWS_PER_PASS, Decomposition, Reference, View
 from luxcore.models.small.grid import (
-    OnGrid,
     geometry_to_grid,
     grid_size,
     masks_to_grid,
     photo_to_grid,
     to_grid,
 )
-from luxcore.models.small.heads import WarpedLight
+from luxcore.models.small.heads import OnGrid, WarpedLight
 from luxcore.models.small.hints import KnownLight, References, references_of
 from luxcore.models.small.multiview import TargetView, multiview_features
 from luxcore.models.small.network import UNet
@@ -67,7 +66,7 @@ class SmallHarmonizer:
         on = target.on[index]
         warped = WarpedLight(warped.ratio[index], warped.known[index])
         small = OnGrid(target.photo, target.masks[index])
-        fields = run_network(self.net, features[index], on, small.masks, warped)
+        fields = run_network(self.net, features[index], on, small, warped)
         part = finish(fields, small, view.image_linear, view.masks[heard_of], on)
         return part if heard_of.all() else with_unseen(part, heard_of)
 

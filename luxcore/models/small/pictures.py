@@ -24,7 +24,7 @@ def validation_sheet(
     rows = []
     with torch.no_grad():
         for features, example in cases[:ROWS]:
-            fields = light_fields(net(features), example.on, example.masks, example.warped)
+            fields = light_fields(net(features), example.on, example.seen, example.warped)
             light = lamp_light(fields, example.photo, example.on)[0]
             mask = example.masks[:1].expand(3, -1, -1)
             shown = [_shown(example.photo), mask, _shown(light), _shown(example.lights[0])]

@@ -26,7 +26,7 @@ def mean_psnr(net: UNet, cases: Sequence[tuple[Tensor, Example]], *, on: bool = 
     burn in the photo or of those that do not; NaN when there are none."""
 
     def predict(features: Tensor, example: Example) -> Tensor:
-        fields = light_fields(net(features), example.on, example.masks, example.warped)
+        fields = light_fields(net(features), example.on, example.seen, example.warped)
         return lamp_light(fields, example.photo, example.on)
 
     return mean_psnr_of(predict, cases, on=on)

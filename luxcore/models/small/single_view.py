@@ -15,14 +15,13 @@ from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
 from luxcore.models.small.grid import (
-    OnGrid,
     fields_at_full_size,
     geometry_to_grid,
     grid_size,
     masks_to_grid,
     photo_to_grid,
 )
-from luxcore.models.small.heads import LightFields, WarpedLight, lamp_light, light_fields
+from luxcore.models.small.heads import LightFields, OnGrid, WarpedLight, lamp_light, light_fields
 from luxcore.models.small.network import SV_OUTPUTS, UNet
 from luxcore.models.small.samples import chw
 
@@ -61,7 +60,7 @@ class SmallDecomposer:
             surfaces = estimate_surfaces(self.estimator, small)
         seen = OnGrid(small, masks_to_grid(masks, size))
         features = lamp_features(small, seen.masks, burning, surfaces)
-        fields = run_network(self.net, features, burning, seen.masks)
+        fields = run_network(self.net, features, burning, seen)
         return finish(fields, seen, image_linear, masks, burning)
 
     def _stride(self) -> int:
@@ -73,15 +72,15 @@ def run_network(
     net: UNet,
     features: Float[Tensor, "k c y x"],
     on: Bool[Tensor, " k"],
-    masks: Float[Tensor, "k y x"],
+    small: OnGrid,
     warped: WarpedLight | None = None,
 ) -> LightFields:
     """The light fields of one photo on the grid; K = 0 needs no network."""
     if not len(features):
-        return light_fields(features.new_zeros(0, SV_OUTPUTS, *features.shape[-2:]), on, masks)
+        return light_fields(features.new_zeros(0, SV_OUTPUTS, *features.shape[-2:]), on, small)
     with torch.inference_mode():
         outputs = net(features.contiguous(memory_format=torch.channels_last))
-    return light_fields(outputs.clone(), on, masks, warped)
+    return light_fields(outputs.clone(), on, small, warped)
 
 
 def finish(
