@@ -13,7 +13,6 @@ from luxcore.models.small.train import main
 from luxcore.models.small.weights import load_network
 from tests.data.analytic import panorama
 
-
 SMALL = ("--base", "shipped", "--groups", "2", "--sketches", "0", "--size", "32",
          "--photos", "1", "--steps", "2")  # fmt: skip
 
