@@ -66,9 +66,25 @@ def draw_own_light(rng: Generator, on: Bool[np.ndarray, " m"]) -> Relighting:
     return Relighting(on ^ switched, power.astype(np.float32), ambient.astype(np.float32))
 
 
-def exposed(crops: Sequence[LitCrop], rng: Generator, jitter_ev: float = 1.0) -> list[LitCrop]:
-    """One exposure for all views: the median of what each asks for, up to ±`jitter_ev` stops."""
-    wanted = [estimate_exposure(crop.image_linear) for crop in crops]
+def one_more_burning(on: Bool[np.ndarray, " m"], rng: Generator) -> Bool[np.ndarray, " m"]:
+    """The same lamps and one of those that are off, where there is one."""
+    more = on.copy()
+    if not on.all():
+        more[rng.choice(np.flatnonzero(~on))] = True
+    return more
+
+
+def exposed(
+    crops: Sequence[LitCrop],
+    rng: Generator,
+    jitter_ev: float = 1.0,
+    metered: Bool[np.ndarray, " m"] | None = None,
+) -> list[LitCrop]:
+    """One exposure for all views: the median of what each asks for, up to ±`jitter_ev` stops.
+
+    `metered` are the lamps that burnt when the exposure was chosen; None: those that burn."""
+    asked = crops if metered is None else [replace(crop, on=metered) for crop in crops]
+    wanted = [estimate_exposure(crop.image_linear) for crop in asked]
     exposure = float(np.median(wanted) * 2.0 ** rng.uniform(-jitter_ev, jitter_ev))
     return [replace(crop, exposure=exposure) for crop in crops]
 

@@ -15,7 +15,13 @@ from analytic import LAMPS, light_at, panorama, perspective
 from luxcore.cameras import look_at
 from luxcore.data.compact import as_taken
 from luxcore.data.crops import LitCrop, ViewSource, with_lamps
-from luxcore.data.lighting import brackets, draw_relighting, one_light_off
+from luxcore.data.lighting import (
+    brackets,
+    draw_relighting,
+    exposed,
+    one_light_off,
+    one_more_burning,
+)
 from luxcore.data.multiview import MultiViewSets
 from luxcore.data.panorama import view_rotation
 from luxcore.data.training import SingleViewSamples, generator, mask_centre_deg
@@ -202,3 +208,16 @@ def test_multiview_set_of_perspective_views_takes_each_once():
     crops = MultiViewSets([perspective(c) for c in cameras], SIZE, seed=0).crops(0, 8)
     assert len(crops) == 3
     assert len({tuple(c.camera.centre) for c in crops}) == 3
+
+
+def test_a_camera_on_a_tripod_keeps_the_exposure_of_the_lamp_that_went_off():
+    crop = ViewSource(panorama()).cut(view_rotation(0.0, 0.0), 70.0, 32, 24)
+    dark = replace(crop, on=np.array([True, False, True]))
+    lit = one_more_burning(dark.on, generator(1))
+    assert lit.all()
+    (kept,) = exposed([dark], generator(2), metered=lit)
+    (chosen,) = exposed([replace(dark, on=lit)], generator(2))
+    assert kept.exposure == chosen.exposure
+    assert exposed([dark], generator(2))[0].exposure > kept.exposure
+    assert (kept.on == dark.on).all()
+    assert one_more_burning(lit, generator(1)).all()

@@ -139,7 +139,8 @@ def _glowing(
     counted = (small.masks <= 0.5).all(0).to(photo).expand_as(photo)
     sent = (photo * torch.exp(log_ratio)) ** 2 * counted
     mean_square = sent.sum((2, 3)) / counted.sum((1, 2)).clamp_min(1)
-    level = 0.5 * torch.log(mean_square + 1e-9)[..., None, None]
+    # How brightly a lamp glows shall teach nothing about what it lights up.
+    level = 0.5 * torch.log(mean_square.detach() + 1e-9)[..., None, None]
     inside = level + GLOW + glow - torch.log(photo)
     return torch.where(outside > 0, log_ratio, inside.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO))
 

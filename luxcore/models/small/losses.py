@@ -41,13 +41,16 @@ def example_loss(fields: LightFields, example: Example) -> Tensor:
         terms.append(0.2 * _fraction_error(fields, example))
         clipped = (example.photo.amax(0) > CLIPPED) & (example.masks[on] > 0.5)
         terms.append(GLOW_WEIGHT * _glow_error(lit, truth, clipped))
-        terms.append(SCORE_WEIGHT * _score_error(lit, truth))
+        terms.append(SCORE_WEIGHT * _score_error(lit, truth, _not_white(truth)))
     if bool((~on).any()):
         share = float((~on).float().mean())
         lit, truth = light[~on], example.lights[~on]
-        terms.append(share * OFF_SCORE_WEIGHT * _score_error(lit, truth))
+        emitters = example.masks[~on] > 0.5
+        # A shade that glows more or less than it should must not decide over the whole room.
+        reflecting = _not_white(truth) & ~emitters[:, None]
+        terms.append(share * OFF_SCORE_WEIGHT * _score_error(lit, truth, reflecting))
         terms.append(share * OFF_WEIGHT * _seen_error(lit, truth))
-        terms.append(share * GLOW_WEIGHT * _glow_error(lit, truth, example.masks[~on] > 0.5))
+        terms.append(share * GLOW_WEIGHT * _glow_error(lit, truth, emitters))
     return torch.stack(terms).sum() if terms else fields.fraction.sum() * 0
 
 
@@ -91,11 +94,18 @@ def _glow_error(
     return (difference.abs() * emitters).sum() / emitters.sum().clamp_min(1)
 
 
-def _score_error(predicted: Float[Tensor, "k 3 h w"], truth: Float[Tensor, "k 3 h w"]) -> Tensor:
+def _not_white(truth: Float[Tensor, "k 3 h w"]) -> Bool[Tensor, "k 1 h w"]:
+    return truth.amax(1, keepdim=True) < PHOTO_MAX
+
+
+def _score_error(
+    predicted: Float[Tensor, "k 3 h w"],
+    truth: Float[Tensor, "k 3 h w"],
+    measured: Bool[Tensor, "k 1 h w"],
+) -> Tensor:
     """Mean natural log of the squared error on the display curve after the best scale per lamp and
-    channel: half with the scale fitted to light that is not white, half to what is displayed."""
-    unclipped = (truth.amax(1, keepdim=True) < PHOTO_MAX).to(truth)
-    light_scale = _best_scale(predicted * unclipped, truth).clamp(1e-3, 1e3)
+    channel: half with the scale fitted to light where it is `measured`, half to what is shown."""
+    light_scale = _best_scale(predicted * measured, truth).clamp(1e-3, 1e3)
     shown, target = display_curve(predicted), display_curve(truth)
     by_light = display_curve(predicted * light_scale)
     by_picture = shown * _best_scale(shown, target)

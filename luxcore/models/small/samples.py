@@ -11,10 +11,14 @@ import torch
 from numpy.random import Generator
 
 from luxcore.data.crops import LitCrop
-from luxcore.data.lighting import draw_own_light, draw_relighting, exposed
+from luxcore.data.lighting import draw_own_light, draw_relighting, exposed, one_more_burning
 
 OWN_LIGHT_SHARE = 0.5
 """Of training photos: the other half gets lamps of any colour and power."""
+
+TRIPOD_SHARE = 0.5
+"""Of photos: exposed for one lamp more than burns in them, as when somebody switches it off and
+leaves the camera as it is."""
 
 
 @runtime_checkable
@@ -57,7 +61,9 @@ def relit(group: Sequence[LitCrop], rng: Generator, *, own_light: bool = False) 
     """The same photos in the same order, all under one new light, or nearly under their own."""
     on = group[0].on
     light = draw_own_light(rng, on) if own_light else draw_relighting(rng, len(on))
-    return exposed([light.apply(crop) for crop in group], rng)
+    lit = [light.apply(crop) for crop in group]
+    metered = one_more_burning(light.on, rng) if rng.random() < TRIPOD_SHARE else light.on
+    return exposed(lit, rng, metered=metered)
 
 
 def chw(image: np.ndarray) -> torch.Tensor:
