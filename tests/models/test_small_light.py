@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
-from luxcore.models.small.grid import fields_at_full_size, grid_size, masks_to_grid
+from luxcore.models.small.grid import grid_size, lights_at_full_size, masks_to_grid
 from luxcore.models.small.heads import (
     GLOW,
     LightFields,
@@ -136,19 +136,24 @@ def test_a_lamp_of_one_pixel_stays_visible_on_the_grid() -> None:
     assert float(masks_to_grid(masks, (64, 64)).max()) > 0.5
 
 
-def test_enlarged_fractions_sum_to_one_and_follow_the_photos_edge() -> None:
+def test_enlarged_lights_add_up_and_follow_the_photos_edge() -> None:
     photo = torch.full((3, 128, 128), 0.05)
     photo[:, :, 67:] = 2.0
     small = torch.nn.functional.interpolate(photo[None], (32, 32), mode="area")[0]
     lit = torch.nn.functional.interpolate((photo > 1)[None].float(), (32, 32), mode="area")[0]
     fraction = torch.stack([1 - 0.9 * lit, 0.9 * lit])
     fields = LightFields(fraction, torch.zeros(1, 3, 32, 32), torch.zeros(1, 3, 32, 32))
-    nothing = torch.zeros(1, 32, 32), torch.zeros(1, 128, 128)
-    grids = OnGrid(small, nothing[0]), OnGrid(photo, nothing[1])
-    full = fields_at_full_size(fields, *grids, torch.tensor([True]))
-    torch.testing.assert_close(full.fraction.sum(0), torch.ones(3, 128, 128))
-    step = full.fraction[1, 0, 64, 67] - full.fraction[1, 0, 64, 66]
+    lights, ambient = lights_at_full_size(
+        fields,
+        OnGrid(small, torch.zeros(1, 32, 32)),
+        photo,
+        torch.zeros(1, 128, 128, dtype=torch.bool),
+        torch.tensor([True]),
+    )
+    torch.testing.assert_close(lights[0] + ambient, photo)
+    full = (lights[0] / photo)[0, 64]
     plain = torch.nn.functional.interpolate(fraction, (128, 128), mode="bilinear")[1, 0, 64]
+    step = full[67] - full[66]
     assert step > 2 * (plain[67] - plain[66]), "the guided filter restores the edge"
 
 
@@ -171,8 +176,8 @@ def test_a_lamp_switched_on_glows_to_the_edge_of_its_mask() -> None:
     outputs[:, 6:9] = torch.where(coverage > 0.5, 5.0, -1.0)
     on, small = torch.tensor([False]), OnGrid(photo[:, ::4, ::4], coverage)
     fields = light_fields(outputs, on, small)
-    light = lamp_light(fields_at_full_size(fields, small, OnGrid(photo, masks), on), photo, on)[0]
     inside = masks[0] > 0
+    light = lights_at_full_size(fields, small, photo, inside[None], on)[0][0]
     wall = 0.22 * np.exp(-1.0)
     torch.testing.assert_close(light[:, ~inside], torch.full_like(light[:, ~inside], wall))
     glow = wall * np.exp(GLOW)

@@ -9,14 +9,23 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.models.interface import Geometry
-from luxcore.models.small.heads import LightFields, OnGrid
-from luxcore.models.small.levels import CLIPPED, PHOTO_MAX
+from luxcore.models.small.heads import (
+    LightFields,
+    OnGrid,
+    burning_light,
+    lamp_light,
+    unlit_light,
+)
+from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
 
 GUIDE_RADIUS = 2
 GUIDE_SMOOTHNESS = 0.05
 """Variance of the guide (in stops/4, squared) below which a patch counts as flat."""
+
+FILL_RADIUS = 4
+"""Two guided windows inside a mask nothing is told any more of what lies around it."""
 
 EDGE_COVERAGE = 0.25
 """From this share of a mask on a place of the grid tells nothing of what lies around the lamp."""
@@ -70,54 +79,45 @@ def geometry_to_grid(geometry: Geometry | None, size: tuple[int, int]) -> Surfac
     return surfaces_of(depth, normal, camera)
 
 
-def fields_at_full_size(
-    fields: LightFields, small: OnGrid, full: OnGrid, on: Bool[Tensor, " k"]
-) -> LightFields:
-    """Light fields of the grid at the photo's size, with edges where the photo has them.
+def lights_at_full_size(
+    fields: LightFields,
+    small: OnGrid,
+    photo: Float[Tensor, "3 h w"],
+    masks: Bool[Tensor, "k h w"],
+    on: Bool[Tensor, " k"],
+) -> tuple[Float[Tensor, "k 3 h w"], Float[Tensor, "3 h w"]]:
+    """Every lamp's linear light and the ambient, with edges where the photo has them.
 
     A fast guided filter (He and Sun 2015): in every window a field is a line of the guide, and the
     line's two coefficients are what is enlarged. Fractions are brought back to a sum of exactly 1.
+    One lamp after the other, so that 12 megapixels stay small.
     """
-    photo = full.photo
     if small.photo.shape == photo.shape:
-        return fields
-    guide_small, guide = _guide(small.photo), _guide(photo)
-    height, width = photo.shape[1:]
-    fraction = _guided(fields.fraction, guide_small, guide).clamp_min(0)
-    nothing = fields.log_ratio.new_zeros(1, 1, 1, 1).expand(len(on), 3, height, width)
-    # What no pixel or lamp asks for is not enlarged: for a large photo that is most of the work.
-    unlit = not bool(on.all())
-    glowing = bool(on.any()) and bool((photo.amax(0) > CLIPPED).any())
-    return LightFields(
-        fraction / fraction.sum(0, keepdim=True).clamp_min(1e-6),
-        _ratio_at_full_size(fields.log_ratio, small, full) if unlit else nothing,
-        _enlarged(fields.log_boost, (height, width)) if glowing else nothing,
-    )
+        return lamp_light(fields, photo, on), fields.fraction[0] * photo
+    guides, size = (_guide(small.photo), _guide(photo)), photo.shape[1:]
+    shares = _guided(fields.fraction, *guides).clamp_(min=0)
+    shares /= shares.sum(0).clamp_min_(1e-6)
+    lights, ambient = shares[1:], shares[0] * photo
+    for lamp, burning in enumerate(on.tolist()):
+        if burning:
+            boost = _enlarged(fields.log_boost[lamp : lamp + 1], size)[0]
+            lights[lamp] = burning_light(photo, lights[lamp], boost)
+        else:
+            coverage, field = small.masks[lamp], fields.log_ratio[lamp]
+            ratio = _guided(_filled(field, coverage <= EDGE_COVERAGE), *guides)
+            # What glows ends where its mask does, and nothing of it spills onto the wall.
+            inside = _enlarged(_filled(field, coverage > 0.5)[None], size)[0]
+            lights[lamp] = unlit_light(photo, torch.where(masks[lamp], inside, ratio))
+    return lights, ambient
 
 
-def _ratio_at_full_size(
-    log_ratio: Float[Tensor, "k 3 y x"], small: OnGrid, full: OnGrid
-) -> Float[Tensor, "k 3 h w"]:
-    """Enlarged inside and outside of each lamp's mask apart: what glows ends where its mask does,
-    and nothing of it spills onto the wall."""
-    covered = (small.masks > 0.5)[:, None].to(log_ratio)
-    touched = (small.masks > EDGE_COVERAGE)[:, None].to(log_ratio)
-    surroundings = _filled(log_ratio, 1 - touched)
-    ratio = _guided(surroundings, _guide(small.photo), _guide(full.photo))
-    for lamp, glow in enumerate(_filled(log_ratio, covered)):
-        inside = full.masks[lamp] > 0.5
-        ratio[lamp][:, inside] = _enlarged(glow[None], inside.shape)[0][:, inside]
-    return ratio
-
-
-def _filled(
-    field: Float[Tensor, "k 3 y x"], known: Float[Tensor, "k 1 y x"]
-) -> Float[Tensor, "k 3 y x"]:
-    """The field with what is not `known` (0 or 1) taken from its neighbours that are; as it was
-    where none is near."""
-    weight = _box(known)
-    nearby = _box(field * known) / weight.clamp_min(1e-6)
-    return torch.where((known > 0) | (weight <= 0), field, nearby)
+def _filled(field: Float[Tensor, "3 y x"], known: Bool[Tensor, "y x"]) -> Float[Tensor, "3 y x"]:
+    """The field with what is not `known` taken from its neighbours that are; as it was where none
+    is near."""
+    counted = known[None].to(field)
+    weight = _box(counted, FILL_RADIUS)
+    nearby = _box(field * counted, FILL_RADIUS) / weight.clamp_min(1e-6)
+    return torch.where(known | (weight <= 0), field, nearby)
 
 
 def _guide(photo: Tensor) -> Tensor:
@@ -147,9 +147,8 @@ def _enlarged(plane: Tensor, size: tuple[int, int] | torch.Size) -> Tensor:
     return fn.interpolate(plane, tuple(size), mode="bilinear", align_corners=False)
 
 
-def _box(plane: Tensor) -> Tensor:
+def _box(plane: Tensor, radius: int = GUIDE_RADIUS) -> Tensor:
     """Mean over a square window, by the pixels that exist."""
-    radius = GUIDE_RADIUS
     return fn.avg_pool2d(plane, 2 * radius + 1, stride=1, padding=radius, count_include_pad=False)
 
 

@@ -156,7 +156,22 @@ def lamp_light(
     fields: LightFields, photo: Float[Tensor, "3 h w"], on: Bool[Tensor, " k"]
 ) -> Float[Tensor, "k 3 h w"]:
     """Linear light of each lamp: what it gives when on, what it would give when off."""
+    burning = burning_light(photo, fields.fraction[1:], fields.log_boost)
+    return torch.where(on.view(-1, 1, 1, 1), burning, unlit_light(photo, fields.log_ratio))
+
+
+def burning_light(
+    photo: Float[Tensor, "3 h w"],
+    fraction: Float[Tensor, "*k 3 h w"],
+    log_boost: Float[Tensor, "*k 3 h w"],
+) -> Float[Tensor, "*k 3 h w"]:
+    """The share of the photo that a burning lamp has, boosted where the photo is clipped."""
     clipped = (photo.amax(0) > CLIPPED).to(photo)
-    burning = fields.fraction[1:] * photo * torch.exp(fields.log_boost * clipped)
-    switched_on = (photo + RATIO_FLOOR) * torch.exp(fields.log_ratio)
-    return torch.where(on.view(-1, 1, 1, 1), burning, switched_on)
+    return fraction * photo * torch.exp(log_boost * clipped)
+
+
+def unlit_light(
+    photo: Float[Tensor, "3 h w"], log_ratio: Float[Tensor, "*k 3 h w"]
+) -> Float[Tensor, "*k 3 h w"]:
+    """What a lamp that is off would add to the photo."""
+    return (photo + RATIO_FLOOR) * torch.exp(log_ratio)

@@ -15,13 +15,13 @@ from luxcore.models.small.emitters import emitter_masks, keep_out_of_emitters
 from luxcore.models.small.features import lamp_features
 from luxcore.models.small.geometry import estimate_surfaces
 from luxcore.models.small.grid import (
-    fields_at_full_size,
     geometry_to_grid,
     grid_size,
+    lights_at_full_size,
     masks_to_grid,
     photo_to_grid,
 )
-from luxcore.models.small.heads import LightFields, OnGrid, WarpedLight, lamp_light, light_fields
+from luxcore.models.small.heads import LightFields, OnGrid, WarpedLight, light_fields
 from luxcore.models.small.network import SV_OUTPUTS, UNet
 from luxcore.models.small.samples import chw
 
@@ -97,8 +97,7 @@ def finish(
     """
     photo = chw(image_linear).clamp_min(0)
     covered = torch.from_numpy(masks)
-    fields = fields_at_full_size(fields, small, OnGrid(photo, covered.float()), on)
-    lights, ambient = lamp_light(fields, photo, on), fields.fraction[0] * photo
+    lights, ambient = lights_at_full_size(fields, small, photo, covered, on)
     lights, ambient = keep_out_of_emitters(lights, ambient, emitter_masks(photo, covered), on)
     scale = on.float()[:, None].expand(-1, 3)
     return Decomposition(_hwc(ambient), _hwc(lights), scale.numpy().copy())
