@@ -71,7 +71,7 @@ def main(
         "photos_per_step": photos,
         "rooms": rooms,
         "check_every": 200,
-        "validation_groups": 16,
+        "validation_groups": 32,
         "cooldown": 0.4,
     }
     out.mkdir(parents=True, exist_ok=True)
