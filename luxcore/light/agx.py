@@ -25,6 +25,8 @@ CELLS = k.LATTICE_SIZE - 1
 START_CELLS = 40
 """Cells per axis of the table that starts the inverse's search."""
 NEWTON_STEPS = 12
+BLOCK = 1 << 18
+"""Colours inverted at once: some 100 MB, however large the photo."""
 
 
 def agx(linear: Array) -> Array:
@@ -54,12 +56,20 @@ def agx_inverse(display: Array) -> Array:
         found = torch.from_numpy(agx_inverse(display.detach().cpu().numpy()))
         return found.to(display.device)
     flat = display.reshape(-1, 3)
-    valid = np.isfinite(flat).all(-1)[:, None]
-    formed = srgb_decode(np.clip(np.where(valid, flat, 0), 0, 1).astype(flat.dtype))
+    found = np.empty_like(flat)
+    for start in range(0, len(flat), BLOCK):
+        found[start : start + BLOCK] = _inverted(flat[start : start + BLOCK])
+    return found.reshape(display.shape)
+
+
+def _inverted(display: np.ndarray) -> np.ndarray:
+    """`agx_inverse` of one block [n, 3]."""
+    valid = np.isfinite(display).all(-1)[:, None]
+    formed = srgb_decode(np.clip(np.where(valid, display, 0), 0, 1).astype(display.dtype))
     encoded = formed ** (1.0 / k.DISPLAY_GAMMA)
     position = _refine(Tetrahedra(encoded * START_CELLS, _start_lattice()).value(), encoded)
     scene = colour_matrix(_radiance(position / CELLS), k.REC709_FROM_E)
-    return np.where(valid, scene, np.nan).astype(display.dtype).reshape(display.shape)
+    return np.where(valid, scene, np.nan)
 
 
 def srgb_encode(linear: Array) -> Array:
