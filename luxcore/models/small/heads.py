@@ -31,11 +31,10 @@ MAX_LOG_BOOST = 6.0
 RATIO_FLOOR = 0.02
 """Added to the photo before the ratio multiplies it: black pixels can be lit as well."""
 
-
 GLOW = 4.0
-"""Natural log of a burning lamp's own light (nine tenths of its mask are darker) over the root mean
-square of what it sends to the rest of a photo: the mean over the training rooms' lamps, with a
-standard deviation of 1.5."""
+"""Natural log of a burning lamp's own light (its mask's brightest tenth) over the root mean square
+of what it sends to the rest of a photo: the median over 220 lamps of rooms that no weights had
+seen, 3.7 in the mean, with a standard deviation of 1.5."""
 
 
 @dataclass(frozen=True)
