@@ -10,6 +10,7 @@ for the browser.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from types import ModuleType
 
@@ -26,7 +27,7 @@ START_CELLS = 40
 """Cells per axis of the table that starts the inverse's search."""
 NEWTON_STEPS = 12
 BLOCK = 1 << 18
-"""Colours inverted at once: some 100 MB, however large the photo."""
+"""Colours of an array that are taken at once: some 100 MB, however large the photo."""
 
 
 def agx(linear: Array) -> Array:
@@ -35,6 +36,8 @@ def agx(linear: Array) -> Array:
     Negative (out-of-gamut) colours are brought inside; radiance up to 0.18·2^-10 is black, +inf is
     white, a colour with a NaN stays NaN. The gradient is zero where the image is clipped.
     """
+    if isinstance(linear, np.ndarray) and linear.size > 3 * BLOCK:
+        return _in_blocks(agx, linear)
     xp = namespace(linear)
     position = _position(xp, linear)
     valid = xp.isfinite(position).all(-1)[..., None]
@@ -55,21 +58,25 @@ def agx_inverse(display: Array) -> Array:
         # No gradient is due, and numpy gathers several times faster than torch on a CPU.
         found = torch.from_numpy(agx_inverse(display.detach().cpu().numpy()))
         return found.to(display.device)
-    flat = display.reshape(-1, 3)
-    found = np.empty_like(flat)
-    for start in range(0, len(flat), BLOCK):
-        found[start : start + BLOCK] = _inverted(flat[start : start + BLOCK])
-    return found.reshape(display.shape)
+    return _in_blocks(_inverted, display)
+
+
+def _in_blocks(curve: Callable[[np.ndarray], np.ndarray], colours: np.ndarray) -> np.ndarray:
+    """`curve` of all `colours` [..., 3], BLOCK of them at a time."""
+    flat = colours.reshape(-1, 3)
+    starts = range(0, max(len(flat), 1), BLOCK)
+    found = np.concatenate([curve(flat[start : start + BLOCK]) for start in starts])
+    return found.reshape(colours.shape)
 
 
 def _inverted(display: np.ndarray) -> np.ndarray:
-    """`agx_inverse` of one block [n, 3]."""
+    """`agx_inverse` of colours [n, 3]."""
     valid = np.isfinite(display).all(-1)[:, None]
     formed = srgb_decode(np.clip(np.where(valid, display, 0), 0, 1).astype(display.dtype))
     encoded = formed ** (1.0 / k.DISPLAY_GAMMA)
     position = _refine(Tetrahedra(encoded * START_CELLS, _start_lattice()).value(), encoded)
     scene = colour_matrix(_radiance(position / CELLS), k.REC709_FROM_E)
-    return np.where(valid, scene, np.nan)
+    return np.where(valid, scene, np.nan).astype(display.dtype)
 
 
 def srgb_encode(linear: Array) -> Array:
