@@ -131,3 +131,14 @@ def test_opencl_agrees_with_python():
     shown = np.empty_like(linear)
     cl.enqueue_copy(queue, shown, target)
     assert np.abs(shown - agx(linear.astype(np.float64))).max() < 1e-4
+
+
+def test_large_pictures_are_taken_in_blocks_to_the_same_bits(monkeypatch):
+    rng = np.random.Generator(np.random.PCG64(5))
+    linear = np.exp(rng.normal(-1, 2, (20, 30, 3))).astype(np.float32)
+    linear[3, 4] = np.nan
+    whole = agx(linear), agx_inverse(agx(linear))
+    monkeypatch.setattr("luxcore.light.agx.BLOCK", 70)
+    for first, second in zip(whole, (agx(linear), agx_inverse(agx(linear))), strict=True):
+        np.testing.assert_array_equal(first, second)
+        assert first.dtype == second.dtype == np.float32
