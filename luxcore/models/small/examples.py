@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from luxcore.data.crops import LitCrop
-from luxcore.models.small.heads import OnGrid, WarpedLight
+from luxcore.models.small.heads import LightFields, OnGrid, WarpedLight, light_fields
 from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
@@ -40,6 +40,10 @@ class Example:
     def seen(self) -> OnGrid:
         """What the heads are told."""
         return OnGrid(self.photo, self.masks)
+
+    def fields(self, outputs: Float[Tensor, "k o h w"]) -> LightFields:
+        """What a network's `outputs` for this photo say."""
+        return light_fields(outputs, self.on, self.seen, self.warped)
 
 
 def to_example(

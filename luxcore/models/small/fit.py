@@ -14,7 +14,6 @@ from torch import Tensor
 from luxcore.errors import DivergedError
 from luxcore.files.atomic import atomic_file
 from luxcore.models.small.examples import Example
-from luxcore.models.small.heads import light_fields
 from luxcore.models.small.losses import example_loss
 from luxcore.models.small.network import UNet, channels_last
 from luxcore.progress import progress
@@ -36,8 +35,7 @@ Validate = Callable[[UNet], dict[str, float]]
 
 def lamp_loss(outputs: Tensor, example: Example) -> Tensor:
     """The loss of the lamp networks."""
-    fields = light_fields(outputs, example.on, example.seen, example.warped)
-    return example_loss(fields, example)
+    return example_loss(example.fields(outputs), example)
 
 
 @dataclass(frozen=True)

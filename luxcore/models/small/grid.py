@@ -16,7 +16,7 @@ from luxcore.models.small.heads import (
     lamp_light,
     unlit_light,
 )
-from luxcore.models.small.levels import PHOTO_MAX
+from luxcore.models.small.levels import CLIPPED, PHOTO_MAX
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import Surfaces, surfaces_of
 
@@ -98,15 +98,18 @@ def lights_at_full_size(
     shares = _guided(fields.fraction, *guides).clamp_(min=0)
     shares /= shares.sum(0).clamp_min_(1e-6)
     lights, ambient = shares[1:], shares[0] * photo
+    clipped = bool((photo.amax(0) > CLIPPED).any())
     for lamp, burning in enumerate(on.tolist()):
-        if burning:
+        if burning and not clipped:
+            lights[lamp] *= photo
+        elif burning:
             boost = _enlarged(fields.log_boost[lamp : lamp + 1], size)[0]
             lights[lamp] = burning_light(photo, lights[lamp], boost)
         else:
-            coverage, field = small.masks[lamp], fields.log_ratio[lamp]
-            ratio = _guided(_filled(field, coverage <= EDGE_COVERAGE), *guides)
+            field = fields.log_ratio[lamp]
+            ratio = _guided(_filled(field, small.masks[lamp] <= EDGE_COVERAGE), *guides)
             # What glows ends where its mask does, and nothing of it spills onto the wall.
-            inside = _enlarged(_filled(field, coverage > 0.5)[None], size)[0]
+            inside = _enlarged(_filled(field, small.covered[lamp])[None], size)[0]
             lights[lamp] = unlit_light(photo, torch.where(masks[lamp], inside, ratio))
     return lights, ambient
 

@@ -44,6 +44,11 @@ class OnGrid:
     photo: Float[Tensor, "3 h w"]
     masks: Float[Tensor, "k h w"]
 
+    @property
+    def covered(self) -> Bool[Tensor, "k h w"]:
+        """Where a mask has most of a pixel."""
+        return self.masks > 0.5
+
 
 @dataclass(frozen=True)
 class LightFields:
@@ -109,10 +114,9 @@ def _own_fields(
     )
     off = ~on.view(-1, 1, 1, 1)
     logits = torch.cat([ambient, lamp.masked_fill(off, float("-inf"))])
-    outside = (small.masks <= 0.5).to(ratio)[:, None].expand_as(ratio)
     return LightFields(
         logits.softmax(dim=0),
-        _glowing(_smoothed(ratio, outside), outside, boost, small),
+        _unlit_ratio(ratio, boost, small),
         MAX_LOG_BOOST * torch.sigmoid(boost - 2),
     )
 
@@ -125,23 +129,22 @@ def _smoothed(
     return _binomial(field * counted) / _binomial(counted).clamp_min(1e-6)
 
 
-def _glowing(
-    log_ratio: Float[Tensor, "k 3 h w"],
-    outside: Float[Tensor, "k 3 h w"],
-    glow: Float[Tensor, "k 3 h w"],
-    small: OnGrid,
+def _unlit_ratio(
+    ratio: Float[Tensor, "k 3 h w"], glow: Float[Tensor, "k 3 h w"], small: OnGrid
 ) -> Float[Tensor, "k 3 h w"]:
-    """The ratio as it is `outside` of each lamp's mask, and inside what makes the lamp `glow`."""
-    log_ratio = log_ratio.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+    """The log ratio outside of each lamp's mask, and inside what makes the lamp `glow`."""
+    own = small.covered[:, None]
+    outside = (~own).to(ratio).expand_as(ratio)
+    log_ratio = _smoothed(ratio, outside).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
     photo = small.photo + RATIO_FLOOR
     # Other lamps' emitters are no measure of what this one lights up.
-    counted = (small.masks <= 0.5).all(0).to(photo).expand_as(photo)
+    counted = (~small.covered).all(0).to(photo).expand_as(photo)
     sent = (photo * torch.exp(log_ratio)) ** 2 * counted
     mean_square = sent.sum((2, 3)) / counted.sum((1, 2)).clamp_min(1)
     # How brightly a lamp glows shall teach nothing about what it lights up.
     level = 0.5 * torch.log(mean_square.detach() + 1e-9)[..., None, None]
     inside = level + GLOW + glow - torch.log(photo)
-    return torch.where(outside > 0, log_ratio, inside.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO))
+    return torch.where(own, inside.clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO), log_ratio)
 
 
 def _binomial(field: Float[Tensor, "k 3 h w"]) -> Float[Tensor, "k 3 h w"]:

@@ -39,13 +39,13 @@ def example_loss(fields: LightFields, example: Example) -> Tensor:
         terms.append(_seen_error(lit, truth))
         terms.append(0.5 * _one_light_off_error(fields, example))
         terms.append(0.2 * _fraction_error(fields, example))
-        clipped = (example.photo.amax(0) > CLIPPED) & (example.masks[on] > 0.5)
+        clipped = (example.photo.amax(0) > CLIPPED) & (example.seen.covered[on])
         terms.append(GLOW_WEIGHT * _glow_error(lit, truth, clipped))
         terms.append(SCORE_WEIGHT * _score_error(lit, truth, _not_white(truth)))
     if bool((~on).any()):
         share = float((~on).float().mean())
         lit, truth = light[~on], example.lights[~on]
-        emitters = example.masks[~on] > 0.5
+        emitters = example.seen.covered[~on]
         # A shade that glows more or less than it should must not decide over the whole room.
         reflecting = _not_white(truth) & ~emitters[:, None]
         terms.append(share * OFF_SCORE_WEIGHT * _score_error(lit, truth, reflecting))

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from luxcore.light.agx import agx
 from luxcore.models.small.examples import Example
-from luxcore.models.small.heads import lamp_light, light_fields
+from luxcore.models.small.heads import lamp_light
 from luxcore.models.small.network import UNet
 
 ROWS = 6
@@ -24,8 +24,7 @@ def validation_sheet(
     rows = []
     with torch.no_grad():
         for features, example in cases[:ROWS]:
-            fields = light_fields(net(features), example.on, example.seen, example.warped)
-            light = lamp_light(fields, example.photo, example.on)[0]
+            light = lamp_light(example.fields(net(features)), example.photo, example.on)[0]
             mask = example.masks[:1].expand(3, -1, -1)
             shown = [_shown(example.photo), mask, _shown(light), _shown(example.lights[0])]
             rows.append(torch.cat(shown, dim=2))

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from luxcore.light.agx import agx
 from luxcore.models.small.examples import Example
-from luxcore.models.small.heads import lamp_light, light_fields
+from luxcore.models.small.heads import lamp_light
 from luxcore.models.small.levels import PHOTO_MAX
 from luxcore.models.small.network import UNet
 
@@ -26,8 +26,7 @@ def mean_psnr(net: UNet, cases: Sequence[tuple[Tensor, Example]], *, on: bool = 
     burn in the photo or of those that do not; NaN when there are none."""
 
     def predict(features: Tensor, example: Example) -> Tensor:
-        fields = light_fields(net(features), example.on, example.seen, example.warped)
-        return lamp_light(fields, example.photo, example.on)
+        return lamp_light(example.fields(net(features)), example.photo, example.on)
 
     return mean_psnr_of(predict, cases, on=on)
 
