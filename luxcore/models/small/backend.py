@@ -11,8 +11,8 @@ from luxcore.models.small.single_view import SmallDecomposer
 from luxcore.models.small.weights import load_network, shipped_estimator, shipped_weights
 
 LONG_SIDE_PX = 64
-"""Long side of the network's grid, as in training. At 96 and 128 px photos alone score 0.3 and 0.5
-dB less, photos with given geometry the same."""
+"""Long side of the network's grid, as in training. At 96 and 128 px photos alone score 0.7 and 1.3
+dB less, photos with given geometry the same within 0.2 (docs/tradeoff/README.md)."""
 
 LONG_SIDE_RANGE = (32, 1024)
 
