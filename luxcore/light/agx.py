@@ -36,14 +36,7 @@ def agx(linear: Array) -> Array:
     Negative (out-of-gamut) colours are brought inside; radiance up to 0.18·2^-10 is black, +inf is
     white, a colour with a NaN stays NaN. The gradient is zero where the image is clipped.
     """
-    if isinstance(linear, np.ndarray) and linear.size > 3 * BLOCK:
-        return _in_blocks(agx, linear)
-    xp = namespace(linear)
-    position = _position(xp, linear)
-    valid = xp.isfinite(position).all(-1)[..., None]
-    encoded = Tetrahedra(xp.where(valid, position, xp.zeros_like(position)), lattice()).value()
-    shown = srgb_encode(encoded**k.DISPLAY_GAMMA)
-    return xp.where(valid, shown, xp.full_like(shown, float("nan")))
+    return _in_blocks(_shown, linear) if isinstance(linear, np.ndarray) else _shown(linear)
 
 
 def agx_inverse(display: Array) -> Array:
@@ -69,8 +62,18 @@ def _in_blocks(curve: Callable[[np.ndarray], np.ndarray], colours: np.ndarray) -
     return found.reshape(colours.shape)
 
 
+def _shown(linear: Array) -> Array:
+    """`agx` of colours [..., 3] at once."""
+    xp = namespace(linear)
+    position = _position(xp, linear)
+    valid = xp.isfinite(position).all(-1)[..., None]
+    encoded = Tetrahedra(xp.where(valid, position, xp.zeros_like(position)), lattice()).value()
+    shown = srgb_encode(encoded**k.DISPLAY_GAMMA)
+    return xp.where(valid, shown, xp.full_like(shown, float("nan")))
+
+
 def _inverted(display: np.ndarray) -> np.ndarray:
-    """`agx_inverse` of colours [n, 3]."""
+    """`agx_inverse` of colours [n, 3] at once."""
     valid = np.isfinite(display).all(-1)[:, None]
     formed = srgb_decode(np.clip(np.where(valid, display, 0), 0, 1).astype(display.dtype))
     encoded = formed ** (1.0 / k.DISPLAY_GAMMA)

@@ -61,7 +61,7 @@ def test_a_perfect_flow_arrives_in_any_number_of_steps(pool: CropPool) -> None:
 
 def test_every_variant_is_scored(pool: CropPool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(SHAPES, "sv", replace(SHAPES["sv"], widths=TINY, together=2))
-    monkeypatch.setattr("luxcore.models.small.alternatives.shipped_estimator", lambda: None)
+    monkeypatch.setattr("luxcore.models.small.alternatives.shipped_network", lambda kind: None)
     scores = compare(pool, single_cases(pool, 0), steps=1, photos=1, rate=1e-3, seed=0)
     assert list(scores) == ["fractions", "pixels", *(f"flow, {n} steps" for n in FLOW_STEPS)]
     assert all(0 < row["lamp on"] < 60 for row in scores.values())

@@ -27,12 +27,12 @@ def main(
     """Train the variants on equal terms and score them on photos of rooms kept aside."""
     from luxcore.models.small.alternatives import compare
     from luxcore.models.small.training import SHAPES, pools, single_cases
-    from luxcore.models.small.weights import shipped_estimator
+    from luxcore.models.small.weights import shipped_network
 
     settings = TrainSvSettings(groups=groups, size_px=size, validation_groups=16)
     try:
         pool, aside = pools(data, settings, seed)
-        cases = single_cases(aside, seed, shipped_estimator())
+        cases = single_cases(aside, seed, shipped_network("geometry"))
         scores = compare(pool, cases, steps, photos, rate, seed)
     except LuxError as error:
         click.echo(f"lux: {error}", err=True)

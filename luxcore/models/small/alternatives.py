@@ -24,7 +24,7 @@ from luxcore.models.small.network import UNet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.scores import mean_psnr, mean_psnr_of
 from luxcore.models.small.training import SHAPES, start_network
-from luxcore.models.small.weights import shipped_estimator
+from luxcore.models.small.weights import shipped_network
 
 FLOW_STEPS = (1, 2, 4, 8)
 RGB = 3
@@ -95,7 +95,7 @@ def compare(
     pool: CropPool, cases: Cases, steps: int, photos: int, rate: float, seed: int
 ) -> dict[str, dict[str, float]]:
     """PSNR of lamps on and off, by variant, after `steps` steps each."""
-    batches = SingleBatches(pool, seed, photos, estimator=shipped_estimator())
+    batches = SingleBatches(pool, seed, photos, estimator=shipped_network("geometry"))
     settings = FitSettings(steps, rate, check_every=steps)
     torch.manual_seed(seed)
     fractions = start_network("sv", None, seed)

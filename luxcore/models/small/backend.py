@@ -8,7 +8,7 @@ from luxcore.errors import InputError
 from luxcore.models.interface import BackendSettings, Decomposer, Harmonizer
 from luxcore.models.small.multi_view import SmallHarmonizer
 from luxcore.models.small.single_view import SmallDecomposer
-from luxcore.models.small.weights import load_network, shipped_estimator, shipped_weights
+from luxcore.models.small.weights import load_network, shipped_network, shipped_weights
 
 LONG_SIDE_PX = 64
 """Long side of the network's grid, as in training. At 96 and 128 px photos alone score 0.7 and 1.3
@@ -21,7 +21,7 @@ def open_decomposer(settings: BackendSettings) -> Decomposer:
     """`sv_weights` is a safetensors file (default: the shipped one); options `long_side_px` and
     `estimate` (false leaves the geometry of a lone photo unknown: an ablation)."""
     net = load_network(_path(settings.sv_weights, "sv"), "sv")
-    estimator = shipped_estimator() if settings.options.get("estimate", True) else None
+    estimator = shipped_network("geometry") if settings.options.get("estimate", True) else None
     return SmallDecomposer(net, _long_side(settings), estimator)
 
 

@@ -37,7 +37,6 @@ from luxcore.models.small.weights import (
     CHANNELS,
     load_network,
     save_weights,
-    shipped_estimator,
     shipped_network,
     shipped_weights,
 )
@@ -81,7 +80,7 @@ def train_sv(
     """
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("sv", base_weights("sv", settings, base), seed)
-    estimator = shipped_estimator()
+    estimator = shipped_network("geometry")
     batches = SingleBatches(
         pool, seed, settings.photos_per_step, settings.geometry_share, estimator
     )

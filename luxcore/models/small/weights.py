@@ -43,11 +43,6 @@ def shipped_weights(kind: str) -> Path:
     return SHIPPED / f"{kind}.safetensors"
 
 
-def shipped_estimator() -> UNet | None:
-    """The shipped geometry network; None in a source tree that has none yet."""
-    return shipped_network("geometry")
-
-
 def shipped_network(kind: str) -> UNet | None:
     """The shipped network of a kind; None in a source tree that has none yet."""
     path = shipped_weights(kind)
