@@ -94,6 +94,16 @@ inline void list_by_block(Chunk *chunk, const int count, uint bits[CHUNK_WORDS][
     vstore16(transpose_bits(chunk->blocks + 32 * word), 0, bits[word]);
 }
 
+// Whether a lane of v >= 0 is not 0, as T of a block with unfinished pixels. Spelled so that the
+// compiler sees one test of the whole register: `any` is taken apart lane by lane.
+inline int any_lane(const float16 v) {
+  const int16 bits = as_int16(v);
+  const int8 a = bits.lo | bits.hi;
+  const int4 b = a.lo | a.hi;
+  const int2 c = b.lo | b.hi;
+  return (c.x | c.y) != 0;
+}
+
 // The weight of a block's next Gaussian, 0 where it is not drawn. T is 0 once a pixel is finished.
 inline float16 next_weight(float16 *T, const float8 r, const float16 px, const float16 py) {
   const float16 alpha = alpha_block(log2_alpha_block(r, RECORD_X(r) - px, RECORD_Y(r) - py));

@@ -151,7 +151,8 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
     px[k] = x0 + 4 * k + 0.5f + LANE_X;
     py[k] = y0 + 4 * k + 0.5f + LANE_Y;
   }
-  int open = 0xffff;  // bit b: block b has unfinished pixels
+  int open = 0;  // bit b: block b has unfinished pixels
+  for (int b = 0; b < BLOCKS; ++b) open |= any_lane(blocks[b].T) << b;
   for (int begin = ranges[tile].x; begin < end; begin += CHUNK) {
     const int count = min(CHUNK, end - begin);
 #if COLORS_ONLY
@@ -171,6 +172,7 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
         const int b = popcount(~rest & (rest - 1));
         weights[b] = blend_backward(&blocks[b], r, chunk.features + i * FEATURES, px[b & 3],
                                     py[b >> 2], sums);
+        if (!any_lane(blocks[b].T)) open &= ~(1 << b);
       }
       for (int first = 0; first < PADDED; first += GROUP_SIZE)
         sum_features(blocks, weights, left, first, sums + MOMENTS + first);
@@ -183,7 +185,5 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void raster_backward(
       for (int k = 0; k < PARTIAL_SIZE / 4; ++k)
         vstore4(vload4(k, total), 0, partials + (size_t)row * PARTIAL_SIZE + 4 * k);
     }
-    for (int b = 0; b < BLOCKS; ++b)
-      if (!any(blocks[b].T > 0.0f)) open &= ~(1 << b);
   }
 }

@@ -50,10 +50,10 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void weights_bake(
       if (!(open >> b & 1)) continue;
       const float16 px = x0 + (b & 3) * 4 + 0.5f + LANE_X, py = y0 + (b >> 2) * 4 + 0.5f + LANE_Y;
       for (int word = 0; word < CHUNK_WORDS; ++word)
-        for (uint left = bits[word][b]; left; left &= left - 1) {
+        for (uint left = bits[word][b]; left && any_lane(T[b]); left &= left - 1) {
           const int i = 32 * word + popcount(~left & (left - 1));
           const float16 weight = next_weight(&T[b], chunk.record[i], px, py);
-          if (!any(weight > 0.0f)) continue;
+          if (!any_lane(weight)) continue;
           const float4 quads[QUADS] = QUAD_WEIGHTS(weight);
 #if FILL
           for (int q = 0; q < QUADS; ++q) {
@@ -66,7 +66,7 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void weights_bake(
           for (int q = 0; q < QUADS; ++q) next[b][q] += any(quads[q] > 0.0f);
 #endif
         }
-      if (!any(T[b] > 0.0f)) open &= ~(1 << b);
+      if (!any_lane(T[b])) open &= ~(1 << b);
     }
   }
 #if !FILL
