@@ -1,6 +1,6 @@
 """The rasterizer's cost, beside a torch reference and published figures, in one run.
 
-    python -m benchmarks.splats --json FILE [--quick] [--figures docs/images]
+    python -m benchmarks.splats --json FILE [--quick] [--figures docs/images] [--opensplat DIR]
 
 Everything is timed in process CPU milliseconds (all threads) and wall milliseconds, at 512x512 and
 a fixed seed. A forward pass is projection, binning, sort and blending; a backward pass is
@@ -19,6 +19,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the report here")
     parser.add_argument("--quick", action="store_true", help="fewer points on the curves")
     parser.add_argument("--figures", type=Path, help="draw the curves into this folder")
+    parser.add_argument("--opensplat", type=Path, help="a checkout of OpenSplat to measure beside")
     options = parser.parse_args()
     import numpy as np
 
@@ -28,7 +29,7 @@ def main() -> None:
     from luxcore.splats.device import open_device
 
     np.seterr(all="raise", under="ignore")
-    report = run_all(open_device(), options.quick)
+    report = run_all(open_device(), options.quick, options.opensplat)
     print_report(report)
     if options.json:
         write_json(options.json, report)

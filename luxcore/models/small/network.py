@@ -41,6 +41,8 @@ class NetworkShape:
     """Whether each output gets one number for the whole photo besides: how strong a lamp is."""
     together: int = 0
     """Grids, from the coarsest up, on which the lamps of a photo see each other."""
+    depth: int = 1
+    """Residual blocks on each grid, on the way down and again on the way up."""
 
     @property
     def stride(self) -> int:
@@ -62,6 +64,7 @@ class UNet(nn.Module):
         self.stem = nn.Conv2d(shape.inputs * block, widths[0], 3, padding=1)
         before = (widths[0], *widths[:-1])
         self.down = nn.ModuleList(Residual(i, o) for i, o in zip(before, widths, strict=True))
+        self.down_more = nn.ModuleList(_further(width, shape.depth) for width in widths)
         coarsest = widths[-1]
         self.middle = nn.Sequential(
             *(
@@ -72,17 +75,16 @@ class UNet(nn.Module):
         )
         pairs = list(pairwise(widths))[::-1]
         self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
+        self.up_more = nn.ModuleList(_further(fine, shape.depth) for fine, _ in pairs)
         self.across = nn.ModuleList(
             Attention(fine, shape.heads) for fine, _ in pairs[: shape.attending]
         )
         self.together = nn.ModuleList(
             AmongLamps(width, shape.heads) for width in widths[::-1][: shape.together]
         )
-        self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
-        self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
         # Zero corrections are the first guess itself: a sane start for every lamp.
-        for parameter in self.head.parameters():
-            nn.init.zeros_(parameter)
+        self.head = zeroed(nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1))
+        self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
 
     def forward(
         self, features: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
@@ -91,12 +93,13 @@ class UNet(nn.Module):
         x = self.stem(fn.pixel_unshuffle(features, self.shape.unshuffle))
         skips: list[Tensor] = []
         for level, block in enumerate(self.down):
-            x = block(fn.avg_pool2d(x, 2) if level else x)
+            x = self.down_more[level](block(fn.avg_pool2d(x, 2) if level else x))
             skips.append(x)
         x = self._among_lamps(self.middle(x), 0, photo)
         overall = None if self.overall is None else self.overall(x)
         for level, (block, skip) in enumerate(zip(self.up, skips[-2::-1], strict=True)):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
+            x = self.up_more[level](x)
             if level < len(self.across):
                 x = self.across[level](x)
             x = self._among_lamps(x, level + 1, photo)
@@ -125,6 +128,13 @@ def guessed_outputs(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 9 h 
     return torch.cat([logits, LOG_RATIO_SCALE * features[:, LOG_RATIO]], dim=1)
 
 
+def zeroed(layer: nn.Conv2d) -> nn.Conv2d:
+    """The layer with weights and bias zero: what it is added to starts out as it was."""
+    for parameter in layer.parameters():
+        nn.init.zeros_(parameter)
+    return layer
+
+
 class Residual(nn.Module):
     """Two normalised 3×3 convolutions beside a skip."""
 
@@ -132,13 +142,17 @@ class Residual(nn.Module):
         super().__init__()
         self.norm1, self.norm2 = nn.GroupNorm(8, inputs), nn.GroupNorm(8, outputs)
         self.conv1 = nn.Conv2d(inputs, outputs, 3, padding=1)
-        self.conv2 = nn.Conv2d(outputs, outputs, 3, padding=1)
+        self.conv2 = zeroed(nn.Conv2d(outputs, outputs, 3, padding=1))
         self.skip = nn.Identity() if inputs == outputs else nn.Conv2d(inputs, outputs, 1)
-        nn.init.zeros_(self.conv2.weight)
 
     def forward(self, x: Float[Tensor, "b i h w"]) -> Float[Tensor, "b o h w"]:
         hidden = self.conv1(fn.silu(self.norm1(x)))
         return self.skip(x) + self.conv2(fn.silu(self.norm2(hidden)))
+
+
+def _further(width: int, depth: int) -> nn.Sequential:
+    """The blocks of a grid after its first."""
+    return nn.Sequential(*(Residual(width, width) for _ in range(depth - 1)))
 
 
 class Overall(nn.Module):
@@ -148,10 +162,7 @@ class Overall(nn.Module):
         super().__init__()
         self.norm = nn.GroupNorm(8, width)
         self.inner = nn.Conv2d(width, width, 1)
-        self.out = nn.Conv2d(width, outputs, 1)
-        nn.init.zeros_(self.out.weight)
-        assert self.out.bias is not None
-        nn.init.zeros_(self.out.bias)
+        self.out = zeroed(nn.Conv2d(width, outputs, 1))
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o 1 1"]:
         mean = fn.silu(self.norm(x)).mean((2, 3), keepdim=True)
@@ -166,8 +177,7 @@ class Attention(nn.Module):
         self.heads = heads
         self.norm = nn.GroupNorm(8, width)
         self.qkv = nn.Conv2d(width, 3 * width, 1)
-        self.out = nn.Conv2d(width, width, 1)
-        nn.init.zeros_(self.out.weight)
+        self.out = zeroed(nn.Conv2d(width, width, 1))
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
         q, k, v = self._tokens(x)
@@ -183,11 +193,6 @@ class Attention(nn.Module):
 class AmongLamps(Attention):
     """At every place the lamps of a photo see each other: one lamp's share is what the others
     leave."""
-
-    def __init__(self, width: int, heads: int) -> None:
-        super().__init__(width, heads)
-        assert self.out.bias is not None
-        nn.init.zeros_(self.out.bias)
 
     def forward(
         self, x: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None

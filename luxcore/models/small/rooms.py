@@ -74,6 +74,9 @@ def _pixels(stem: Path) -> str:
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--train", default=400, show_default=True, help="Training rooms.")
+@click.option("--first-seed", default=FIRST_TRAIN_SEED, show_default=True,
+              type=click.IntRange(0, TEST_SEED_BASE - 1),
+              help="Seed of the first training room.")  # fmt: skip
 @click.option("--test", default=30, show_default=True, help="Held-out rooms.")
 @click.option("--views", default=2, show_default=True, type=click.IntRange(1, 4),
               help="Panoramas a room; fewer where fewer fit.")  # fmt: skip
@@ -82,13 +85,20 @@ def _pixels(stem: Path) -> str:
 @click.option("--test-spp", default=8, show_default=True, help="Samples per pixel, held-out rooms.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 def main(
-    train: int, test: int, views: int, height: int, spp: int, test_spp: int, out: Path
+    train: int,
+    first_seed: int,
+    test: int,
+    views: int,
+    height: int,
+    spp: int,
+    test_spp: int,
+    out: Path,
 ) -> None:
     """Render the rooms for training and testing the small models, and list their digests."""
     shared = {"height": height, "views_per_room": views, "max_failed_ratio": 1.0}
     splits = {
         "test": (range(TEST_SEED_BASE, TEST_SEED_BASE + test), test_spp),
-        "train": (range(FIRST_TRAIN_SEED, FIRST_TRAIN_SEED + train), spp),
+        "train": (range(first_seed, first_seed + train), spp),
     }
     store, listed = UnitStore(out / "units"), []
     try:
@@ -98,7 +108,8 @@ def main(
     except LuxError as error:
         click.echo(f"lux: {error}", err=True)
         sys.exit(error.exit_code)
-    command = f"--train {train} --test {test} --views {views} --height {height} --spp {spp}"
+    command = f"--train {train} --first-seed {first_seed} --test {test} --views {views}"
+    command += f" --height {height} --spp {spp}"
     about = {"command": f"python -m luxcore.models.small.rooms {command} --test-spp {test_spp}"}
     write_json(out / "manifest.json", {**about, "panoramas": [asdict(entry) for entry in listed]})
     click.echo(f"{len(listed)} panoramas in {out}")
