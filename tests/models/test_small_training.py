@@ -170,10 +170,13 @@ def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:
     assert all(a >= b for a, b in pairwise(shares[60:]))
 
 
-def test_a_grown_network_answers_as_before(pool: CropPool) -> None:
-    small = tiny("sv")
-    large = LampNet(replace(tiny("mv").shape, depth=3, middle=2, together=2))
+@pytest.mark.parametrize("fine", [0, 8])
+def test_a_grown_network_answers_as_before(pool: CropPool, fine: int) -> None:
+    small = LampNet(replace(tiny("sv").shape, fine=fine))
+    large = LampNet(replace(tiny("mv").shape, depth=3, middle=2, together=2, fine=8))
     torch.nn.init.normal_(small.head.weight, std=0.1)
+    if small.fine is not None:
+        torch.nn.init.normal_(small.fine.head.weight, std=0.1)
     grow(small, large)
     features, _ = group_cases(pool, 0)[0]
     with torch.no_grad():

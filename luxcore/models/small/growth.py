@@ -16,6 +16,8 @@ import click
 from luxcore.errors import InputError, LuxError
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from luxcore.models.small.network import UNet
 
 
@@ -32,12 +34,27 @@ def grow(smaller: UNet, larger: UNet) -> None:
         raise InputError(
             f"a network of widths {smaller.shape.widths} cannot grow into {larger.shape.widths}."
         )
-    weights = {**larger.state_dict(), **smaller.state_dict()}
-    for name in ("stem.weight", "head.weight", "head.bias"):
-        padded = torch.zeros_like(larger.state_dict()[name])
-        padded[tuple(slice(0, size) for size in weights[name].shape)] = weights[name]
-        weights[name] = padded
+    own, weights = larger.state_dict(), {**larger.state_dict(), **smaller.state_dict()}
+    for name in ("stem.weight", "head.weight", "head.bias", "fine.head.weight", "fine.head.bias"):
+        if name in smaller.state_dict():
+            weights[name] = _padded(weights[name], own[name])
+    if smaller.shape.fine:
+        # Its inputs are the features and, after them, the answers.
+        name, split = "fine.stem.weight", smaller.shape.inputs
+        features, answers = weights[name][:, :split], weights[name][:, split:]
+        there = larger.shape.inputs
+        parts = [
+            _padded(features, own[name][:, :there]),
+            _padded(answers, own[name][:, there:]),
+        ]
+        weights[name] = torch.cat(parts, dim=1)
     larger.load_state_dict(weights)
+
+
+def _padded(values: Tensor, like: Tensor) -> Tensor:
+    padded = like.new_zeros(like.shape)
+    padded[tuple(slice(0, size) for size in values.shape)] = values
+    return padded
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})

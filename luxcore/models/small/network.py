@@ -43,6 +43,8 @@ class NetworkShape:
     """Grids, from the coarsest up, on which the lamps of a photo see each other."""
     depth: int = 1
     """Residual blocks on each grid, on the way down and again on the way up."""
+    fine: int = 0
+    """Channels of the blocks that correct the answer on the photo's own grid; 0: none."""
 
     @property
     def stride(self) -> int:
@@ -85,6 +87,7 @@ class UNet(nn.Module):
         # Zero corrections are the first guess itself: a sane start for every lamp.
         self.head = zeroed(nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1))
         self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
+        self.fine = Fine(shape.inputs, shape.outputs, shape.fine) if shape.fine else None
 
     def forward(
         self, features: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
@@ -104,7 +107,8 @@ class UNet(nn.Module):
                 x = self.across[level](x)
             x = self._among_lamps(x, level + 1, photo)
         outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
-        return outputs if overall is None else outputs + overall
+        outputs = outputs if overall is None else outputs + overall
+        return outputs if self.fine is None else outputs + self.fine(features, outputs)
 
     def _among_lamps(self, x: Tensor, grid: int, photo: Tensor | None) -> Tensor:
         return self.together[grid](x, photo) if grid < len(self.together) else x
@@ -167,6 +171,22 @@ class Overall(nn.Module):
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o 1 1"]:
         mean = fn.silu(self.norm(x)).mean((2, 3), keepdim=True)
         return self.out(fn.silu(self.inner(mean)))
+
+
+class Fine(nn.Module):
+    """Corrects answers on the photo's own grid, where edges and small things are: the U-Net's
+    finest grid is coarser, and has few channels for each of its pixels."""
+
+    def __init__(self, inputs: int, outputs: int, width: int, blocks: int = 2) -> None:
+        super().__init__()
+        self.stem = nn.Conv2d(inputs + outputs, width, 3, padding=1)
+        self.blocks = nn.Sequential(*(Residual(width, width) for _ in range(blocks)))
+        self.head = zeroed(nn.Conv2d(width, outputs, 3, padding=1))
+
+    def forward(
+        self, features: Float[Tensor, "b i h w"], answers: Float[Tensor, "b o h w"]
+    ) -> Float[Tensor, "b o h w"]:
+        return self.head(self.blocks(self.stem(torch.cat([features, answers], dim=1))))
 
 
 class Attention(nn.Module):

@@ -48,7 +48,7 @@ from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 WIDTHS = (40, 80, 160, 224)
 SHAPES = {
     kind: NetworkShape(
-        *channels, WIDTHS, middle=3, attending=1, overall=True, together=together, depth=2
+        *channels, WIDTHS, middle=3, attending=1, overall=True, together=together, depth=2, fine=40
     )
     for (kind, channels), together in zip(CHANNELS.items(), (3, 3, 0), strict=True)
 }
