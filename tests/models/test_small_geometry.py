@@ -15,6 +15,7 @@ from luxcore.models.small.geometry import (
     ESTIMATED_TRUST,
     GEOMETRY_OUTPUTS,
     PHOTO_CHANNELS,
+    estimate_surfaces,
     geometry_loss,
     read_outputs,
 )
@@ -66,6 +67,17 @@ def test_a_wrong_scale_costs_less_than_a_wrong_shape(pool: CropPool) -> None:
     tilted[0] += torch.linspace(-0.4, 0.4, right.shape[2])
     losses = [float(geometry_loss(o[None], truth.surfaces, truth.focal)) for o in (farther, tilted)]
     assert 0 < losses[0] < losses[1]
+
+
+def test_a_mirrored_photo_has_mirrored_surfaces() -> None:
+    net = tiny().eval()
+    torch.nn.init.normal_(net.head.weight, std=0.2)
+    photo = torch.rand(3, 32, 32)
+    straight, turned = (estimate_surfaces(net, view) for view in (photo, photo.flip(-1)))
+    mirror = torch.tensor([-1.0, 1, 1]).view(3, 1, 1)
+    assert float((straight.normals - turned.normals).abs().max()) > 1e-2
+    torch.testing.assert_close(turned.points.flip(-1) * mirror, straight.points)
+    torch.testing.assert_close(turned.normals.flip(-1) * mirror, straight.normals)
 
 
 def test_an_untrained_network_sees_a_wall_three_metres_away() -> None:

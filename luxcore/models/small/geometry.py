@@ -57,11 +57,19 @@ def read_outputs(outputs: Float[Tensor, "o h w"]) -> GeometryGuess:
 
 
 def estimate_surfaces(net: UNet, photo: Float[Tensor, "3 h w"]) -> Surfaces:
-    """Surfaces of a linear photo on the network's grid."""
-    features = photo_features(photo)[None].contiguous(memory_format=torch.channels_last)
+    """Surfaces of a linear photo on the network's grid: the mean of what the photo and its mirror
+    image say, whose errors differ. So a mirrored photo has mirrored surfaces."""
+    features = torch.stack([photo_features(view) for view in (photo, photo.flip(-1))])
     with torch.inference_mode():
-        outputs = net(features)[0].float()
-    return read_outputs(outputs.clone()).surfaces()
+        outputs = net(features.contiguous(memory_format=torch.channels_last)).float()
+    return read_outputs((outputs[0] + mirrored(outputs[1])) / 2).surfaces()
+
+
+def mirrored(outputs: Float[Tensor, "o h w"]) -> Float[Tensor, "o h w"]:
+    """The network's answer for the mirror image: a normal's x turns round."""
+    turned = outputs.flip(-1).clone()
+    turned[1] *= -1
+    return turned
 
 
 def geometry_loss(
