@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
 from numpy.random import PCG64, Generator
 
-from luxcore.errors import DivergedError, InputError
-from luxcore.models.small import growth
+from luxcore.errors import DivergedError
 from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
 from luxcore.models.small.examples import to_example
 from luxcore.models.small.fit import FitSettings, fit, lamp_loss, schedule
-from luxcore.models.small.growth import grow
 from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.scores import mean_psnr
 from luxcore.models.small.sketch import SketchRooms
-from luxcore.models.small.training import SHAPES, group_cases, single_cases
-from luxcore.models.small.weights import CHANNELS, load_network, save_weights
+from luxcore.models.small.training import group_cases, single_cases, widen
+from luxcore.models.small.weights import CHANNELS
 from tests.models.sketched import TINY
 
 SETTINGS = FitSettings(steps=6, rate=1e-3, warmup=2, check_every=3)
@@ -170,37 +166,11 @@ def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:
     assert all(a >= b for a, b in pairwise(shares[60:]))
 
 
-@pytest.mark.parametrize("fine", [0, 8])
-def test_a_grown_network_answers_as_before(pool: CropPool, fine: int) -> None:
-    small = LampNet(replace(tiny("sv").shape, fine=fine))
-    large = LampNet(replace(tiny("mv").shape, depth=3, middle=2, together=2, fine=8))
-    torch.nn.init.normal_(small.head.weight, std=0.1)
-    if small.fine is not None:
-        torch.nn.init.normal_(small.fine.head.weight, std=0.1)
-    grow(small, large)
+def test_a_widened_network_answers_as_before(pool: CropPool) -> None:
+    narrow, wide = tiny("sv"), tiny("mv")
+    torch.nn.init.normal_(narrow.head.weight, std=0.1)
+    widen(narrow, wide)
     features, _ = group_cases(pool, 0)[0]
     with torch.no_grad():
-        expected = small(features[:, : small.shape.inputs])
-        torch.testing.assert_close(large(features)[:, : small.shape.outputs], expected)
-
-
-def test_widths_cannot_grow(tmp_path: Path) -> None:
-    small, out = tmp_path / "small.safetensors", tmp_path / "large.safetensors"
-    save_weights(small, "sv", tiny("sv").shape, tiny("sv").state_dict())
-    call = CliRunner().invoke(growth.main, ["sv", "--base", str(small), "--out", str(out)])
-    assert call.exit_code == InputError.exit_code
-    assert "lux: a network of widths (8, 16) cannot grow" in call.output
-    assert not out.exists()
-
-
-def test_the_command_that_grows_weights(tmp_path: Path) -> None:
-    small, out = tmp_path / "small.safetensors", tmp_path / "large.safetensors"
-    shape = replace(SHAPES["geometry"], depth=1, middle=1)
-    save_weights(small, "geometry", shape, UNet(shape).state_dict())
-    call = CliRunner().invoke(growth.main, ["geometry", "--base", str(small), "--out", str(out)])
-    assert call.exit_code == 0, call.output
-    photo = torch.rand(1, shape.inputs, 32, 32)
-    before, after = load_network(small, "geometry"), load_network(out, "geometry")
-    assert after.shape == SHAPES["geometry"]
-    with torch.no_grad():
-        torch.testing.assert_close(after(photo), before(photo))
+        expected = narrow(features[:, : narrow.shape.inputs])
+        torch.testing.assert_close(wide(features)[:, : narrow.shape.outputs], expected)

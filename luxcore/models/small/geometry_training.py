@@ -21,16 +21,20 @@ from luxcore.models.small.examples import to_example
 from luxcore.models.small.features import photo_features
 from luxcore.models.small.fit import FitSettings, fit
 from luxcore.models.small.geometry import (
+    GEOMETRY_OUTPUTS,
+    PHOTO_CHANNELS,
     geometry_loss,
     indoors,
     read_outputs,
 )
-from luxcore.models.small.network import UNet
+from luxcore.models.small.network import NetworkShape, UNet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.surfaces import Surfaces
-from luxcore.models.small.training import base_weights, fit_settings, pools, start_network
-from luxcore.models.small.weights import save_weights
+from luxcore.models.small.training import WIDTHS, base_weights, fit_settings, pools
+from luxcore.models.small.weights import load_network, save_weights
 from luxcore.settings.train_sv import TrainingSettings
+
+SHAPE = NetworkShape(PHOTO_CHANNELS, GEOMETRY_OUTPUTS, WIDTHS, middle=2, attending=1, overall=True)
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,9 @@ def train_geometry(
     into `out` and returns the scores on photos kept aside.
     """
     pool, aside = pools(dataset_dir, settings, seed)
-    net = start_network("geometry", base_weights("geometry", settings, None), seed)
+    torch.manual_seed(seed)
+    base = base_weights("geometry", settings, None)
+    net = UNet(SHAPE) if base is None else load_network(base, "geometry")
     rng = Generator(PCG64(SeedSequence((seed, 2))))
     cases = [seen_photo(relit([crop], rng)[0]) for crop in aside.photos()]
     batches = PhotoBatches(pool, seed, settings.photos_per_step)

@@ -41,10 +41,6 @@ class NetworkShape:
     """Whether each output gets one number for the whole photo besides: how strong a lamp is."""
     together: int = 0
     """Grids, from the coarsest up, on which the lamps of a photo see each other."""
-    depth: int = 1
-    """Residual blocks on each grid, on the way down and again on the way up."""
-    fine: int = 0
-    """Channels of the blocks that correct the answer on the photo's own grid; 0: none."""
 
     @property
     def stride(self) -> int:
@@ -66,7 +62,6 @@ class UNet(nn.Module):
         self.stem = nn.Conv2d(shape.inputs * block, widths[0], 3, padding=1)
         before = (widths[0], *widths[:-1])
         self.down = nn.ModuleList(Residual(i, o) for i, o in zip(before, widths, strict=True))
-        self.down_more = nn.ModuleList(_further(width, shape.depth) for width in widths)
         coarsest = widths[-1]
         self.middle = nn.Sequential(
             *(
@@ -77,17 +72,17 @@ class UNet(nn.Module):
         )
         pairs = list(pairwise(widths))[::-1]
         self.up = nn.ModuleList(Residual(fine + coarse, fine) for fine, coarse in pairs)
-        self.up_more = nn.ModuleList(_further(fine, shape.depth) for fine, _ in pairs)
         self.across = nn.ModuleList(
             Attention(fine, shape.heads) for fine, _ in pairs[: shape.attending]
         )
         self.together = nn.ModuleList(
             AmongLamps(width, shape.heads) for width in widths[::-1][: shape.together]
         )
-        # Zero corrections are the first guess itself: a sane start for every lamp.
-        self.head = zeroed(nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1))
+        self.head = nn.Conv2d(widths[0], shape.outputs * block, 3, padding=1)
         self.overall = Overall(coarsest, shape.outputs) if shape.overall else None
-        self.fine = Fine(shape.inputs, shape.outputs, shape.fine) if shape.fine else None
+        # Zero corrections are the first guess itself: a sane start for every lamp.
+        for parameter in self.head.parameters():
+            nn.init.zeros_(parameter)
 
     def forward(
         self, features: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None
@@ -96,19 +91,17 @@ class UNet(nn.Module):
         x = self.stem(fn.pixel_unshuffle(features, self.shape.unshuffle))
         skips: list[Tensor] = []
         for level, block in enumerate(self.down):
-            x = self.down_more[level](block(fn.avg_pool2d(x, 2) if level else x))
+            x = block(fn.avg_pool2d(x, 2) if level else x)
             skips.append(x)
         x = self._among_lamps(self.middle(x), 0, photo)
         overall = None if self.overall is None else self.overall(x)
         for level, (block, skip) in enumerate(zip(self.up, skips[-2::-1], strict=True)):
             x = block(torch.cat([fn.interpolate(x, scale_factor=2.0), skip], dim=1))
-            x = self.up_more[level](x)
             if level < len(self.across):
                 x = self.across[level](x)
             x = self._among_lamps(x, level + 1, photo)
         outputs = fn.pixel_shuffle(self.head(x), self.shape.unshuffle)
-        outputs = outputs if overall is None else outputs + overall
-        return outputs if self.fine is None else outputs + self.fine(features, outputs)
+        return outputs if overall is None else outputs + overall
 
     def _among_lamps(self, x: Tensor, grid: int, photo: Tensor | None) -> Tensor:
         return self.together[grid](x, photo) if grid < len(self.together) else x
@@ -132,13 +125,6 @@ def guessed_outputs(features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 9 h 
     return torch.cat([logits, LOG_RATIO_SCALE * features[:, LOG_RATIO]], dim=1)
 
 
-def zeroed(layer: nn.Conv2d) -> nn.Conv2d:
-    """The layer with weights and bias zero: what it is added to starts out as it was."""
-    for parameter in layer.parameters():
-        nn.init.zeros_(parameter)
-    return layer
-
-
 class Residual(nn.Module):
     """Two normalised 3×3 convolutions beside a skip."""
 
@@ -146,17 +132,13 @@ class Residual(nn.Module):
         super().__init__()
         self.norm1, self.norm2 = nn.GroupNorm(8, inputs), nn.GroupNorm(8, outputs)
         self.conv1 = nn.Conv2d(inputs, outputs, 3, padding=1)
-        self.conv2 = zeroed(nn.Conv2d(outputs, outputs, 3, padding=1))
+        self.conv2 = nn.Conv2d(outputs, outputs, 3, padding=1)
         self.skip = nn.Identity() if inputs == outputs else nn.Conv2d(inputs, outputs, 1)
+        nn.init.zeros_(self.conv2.weight)
 
     def forward(self, x: Float[Tensor, "b i h w"]) -> Float[Tensor, "b o h w"]:
         hidden = self.conv1(fn.silu(self.norm1(x)))
         return self.skip(x) + self.conv2(fn.silu(self.norm2(hidden)))
-
-
-def _further(width: int, depth: int) -> nn.Sequential:
-    """The blocks of a grid after its first."""
-    return nn.Sequential(*(Residual(width, width) for _ in range(depth - 1)))
 
 
 class Overall(nn.Module):
@@ -166,27 +148,14 @@ class Overall(nn.Module):
         super().__init__()
         self.norm = nn.GroupNorm(8, width)
         self.inner = nn.Conv2d(width, width, 1)
-        self.out = zeroed(nn.Conv2d(width, outputs, 1))
+        self.out = nn.Conv2d(width, outputs, 1)
+        nn.init.zeros_(self.out.weight)
+        assert self.out.bias is not None
+        nn.init.zeros_(self.out.bias)
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b o 1 1"]:
         mean = fn.silu(self.norm(x)).mean((2, 3), keepdim=True)
         return self.out(fn.silu(self.inner(mean)))
-
-
-class Fine(nn.Module):
-    """Corrects answers on the photo's own grid, where edges and small things are: the U-Net's
-    finest grid is coarser, and has few channels for each of its pixels."""
-
-    def __init__(self, inputs: int, outputs: int, width: int, blocks: int = 2) -> None:
-        super().__init__()
-        self.stem = nn.Conv2d(inputs + outputs, width, 3, padding=1)
-        self.blocks = nn.Sequential(*(Residual(width, width) for _ in range(blocks)))
-        self.head = zeroed(nn.Conv2d(width, outputs, 3, padding=1))
-
-    def forward(
-        self, features: Float[Tensor, "b i h w"], answers: Float[Tensor, "b o h w"]
-    ) -> Float[Tensor, "b o h w"]:
-        return self.head(self.blocks(self.stem(torch.cat([features, answers], dim=1))))
 
 
 class Attention(nn.Module):
@@ -197,7 +166,8 @@ class Attention(nn.Module):
         self.heads = heads
         self.norm = nn.GroupNorm(8, width)
         self.qkv = nn.Conv2d(width, 3 * width, 1)
-        self.out = zeroed(nn.Conv2d(width, width, 1))
+        self.out = nn.Conv2d(width, width, 1)
+        nn.init.zeros_(self.out.weight)
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
         q, k, v = self._tokens(x)
@@ -213,6 +183,11 @@ class Attention(nn.Module):
 class AmongLamps(Attention):
     """At every place the lamps of a photo see each other: one lamp's share is what the others
     leave."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__(width, heads)
+        assert self.out.bias is not None
+        nn.init.zeros_(self.out.bias)
 
     def forward(
         self, x: Float[Tensor, "b c h w"], photo: Int[Tensor, " b"] | None = None

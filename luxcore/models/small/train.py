@@ -37,7 +37,6 @@ STEPS = 20_000
     show_default=True,
     help="Single-view photos that come with depth and normals; of the others both are guessed.",
 )
-@click.option("--check-every", default=200, show_default=True, help="Steps between scores.")
 @click.option("--seed", default=0, show_default=True)
 def main(
     kind: str,
@@ -52,7 +51,6 @@ def main(
     size: int,
     rate: float,
     geometry_share: float,
-    check_every: int,
     seed: int,
 ) -> None:
     """Train the geometry, the single-view (sv) or the multi-view (mv) model, in this order: each
@@ -72,7 +70,7 @@ def main(
         "base": base,
         "photos_per_step": photos,
         "rooms": rooms,
-        "check_every": check_every,
+        "check_every": 200,
         "validation_groups": 32,
         "cooldown": 0.4,
     }

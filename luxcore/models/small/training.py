@@ -28,8 +28,7 @@ from luxcore.models.small.batches import (
 )
 from luxcore.models.small.examples import Example, to_example
 from luxcore.models.small.fit import Batches, FitResult, FitSettings, Validate, fit
-from luxcore.models.small.growth import grow
-from luxcore.models.small.network import NetworkShape, UNet
+from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.pictures import validation_sheet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.scores import lamp_scores, mean_psnr
@@ -37,7 +36,6 @@ from luxcore.models.small.sketch import SketchRooms
 from luxcore.models.small.weights import (
     CHANNELS,
     load_network,
-    network_class,
     save_weights,
     shipped_network,
     shipped_weights,
@@ -47,13 +45,10 @@ from luxcore.settings.train_sv import TrainingSettings, TrainSvSettings
 
 WIDTHS = (40, 80, 160, 224)
 SHAPES = {
-    kind: NetworkShape(
-        *channels, WIDTHS, middle=3, attending=1, overall=True, together=together, depth=2, fine=40
-    )
-    for (kind, channels), together in zip(CHANNELS.items(), (3, 3, 0), strict=True)
+    kind: NetworkShape(*channels, WIDTHS, middle=2, attending=1, overall=True, together=3)
+    for kind, channels in CHANNELS.items()
+    if kind != "geometry"
 }
-"""Lamps of a photo see each other; a photo's geometry is one for all of them."""
-
 SKETCH_ROOMS = 100_000
 
 Cases = Sequence[tuple[Tensor, Example]]
@@ -138,16 +133,21 @@ def start_network(kind: str, base: Path | None, seed: int) -> UNet:
     single-view weights for the channels that both have."""
     if base is not None:
         return load_network(base, kind)
-    net = new_network(kind, seed)
+    torch.manual_seed(seed)
+    net = LampNet(SHAPES[kind])
     if kind == "mv" and (single := shipped_network("sv")) is not None:
-        grow(single, net)
+        widen(single, net)
     return net
 
 
-def new_network(kind: str, seed: int) -> UNet:
-    """A network of today's shape, drawn from `seed`."""
-    torch.manual_seed(seed)
-    return network_class(kind)(SHAPES[kind])
+def widen(narrow: UNet, wide: UNet) -> None:
+    """Copy weights of a network with fewer inputs and outputs; the further ones start at zero."""
+    weights = dict(narrow.state_dict())
+    for name in ("stem.weight", "head.weight", "head.bias"):
+        padded = torch.zeros_like(wide.state_dict()[name])
+        padded[tuple(slice(0, size) for size in weights[name].shape)] = weights[name]
+        weights[name] = padded
+    wide.load_state_dict(weights)
 
 
 def single_cases(pool: CropPool, seed: int, estimator: UNet | None = None) -> Cases:
