@@ -14,6 +14,9 @@ import numpy as np
 
 from luxcore.errors import InputError
 
+LARGEST = 1e12
+"""Of a camera's numbers: their products must fit float32, which the kernels calculate in."""
+
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -94,7 +97,7 @@ def camera_from_nerfstudio(
         fx, width, height = float(merged["fl_x"]), int(merged["w"]), int(merged["h"])
         fy = float(merged.get("fl_y", fx))
         cx, cy = float(merged.get("cx", width / 2)), float(merged.get("cy", height / 2))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"camera has a value that is not a number: {error}.") from error
     if c2w.shape == (3, 4):
         c2w = np.vstack([c2w, [0, 0, 0, 1]])
@@ -120,9 +123,9 @@ def _camera_problem(camera: Camera) -> str | None:
     if camera.width < 1 or camera.height < 1:
         return f"size must be at least 1x1, got {camera.width}x{camera.height}"
     numbers = (camera.fx, camera.fy, camera.cx, camera.cy)
-    if not all(math.isfinite(v) for v in numbers) or min(camera.fx, camera.fy) <= 0:
+    if not all(abs(v) < LARGEST for v in numbers) or min(camera.fx, camera.fy) <= 0:
         return f"intrinsics must be finite with a positive focal length, got {numbers}"
-    if camera.c2w.shape != (4, 4) or not np.isfinite(camera.c2w).all():
+    if camera.c2w.shape != (4, 4) or not (np.abs(camera.c2w) < LARGEST).all():
         return "c2w must be a finite 4x4 matrix"
     rotation = camera.c2w[:3, :3]
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3):

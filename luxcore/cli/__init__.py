@@ -66,6 +66,10 @@ def main() -> None:
         code = _complain("stopped.", 130)
     except BrokenPipeError:
         code = 1
+    except OSError as error:
+        if error.filename is None:
+            raise
+        code = _complain(f"{error.filename}: {error.strerror}.", 1)
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -13,6 +13,7 @@ import click
 from luxcore.cli.camera_file import read_camera
 from luxcore.cli.lamp_options import parse_lamp_settings
 from luxcore.errors import InputError
+from luxcore.files.output import check_out_folder
 
 if TYPE_CHECKING:
     from luxcore.cameras import Camera
@@ -46,6 +47,9 @@ LAYOUTS: dict[str, Layout] = {
     "colmap": "colmap",
     "colmap-text": "colmap-text",
 }
+
+CAPTURE_NAMES = ("images", "transforms.json", "points.ply", "sparse")
+"""What the folders of `LAYOUTS` hold."""
 
 
 def _described() -> str:
@@ -112,7 +116,9 @@ def _check_options(
     if view is not None and form != "exr":
         raise InputError(f"--view is for exr, not for {form}.")
     suffix = FORMATS[form].suffix
-    if suffix and not lamps and out.suffix.lower() != suffix:
+    if lamps or not suffix:
+        check_out_folder(out, (f"[0-9][0-9]_*{suffix}",) if lamps else CAPTURE_NAMES)
+    elif out.suffix.lower() != suffix:
         raise InputError(f"{out} must end in {suffix}.")
 
 

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from luxcore.decompose.burning import burning_lamps
-from luxcore.decompose.photo import PhotoLight, decompose_photo
-from luxcore.decompose.store import write_light
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder
 from luxcore.files.exr import read_exr_image
+from luxcore.files.output import check_out_folder
 from luxcore.files.photos import read_mask, read_photo, write_png
-from luxcore.light.agx import agx, agx_inverse
-from luxcore.models.backends import open_decomposer
-from luxcore.models.interface import BackendSettings
+
+if TYPE_CHECKING:
+    from luxcore.decompose.photo import PhotoLight
+    from luxcore.models.interface import BackendSettings
 
 MIN_SIDE_PX = 16
+WRITTEN = ("ambient.exr", "light_*.exr", "lights.json", "blend.html", "pictures")
 BRACKETS_EV = (0, 2, 4)
 
 
@@ -37,11 +38,16 @@ def decompose_file(
 
     Raises InputError or FormatError for files that cannot be used; `out` is then left as it was.
     """
+    check_out_folder(out, WRITTEN)
     shown, linear = _read(photo_path)
     masks, names, off = _masks(shown, mask_paths, off_paths)
-    on = burning_lamps(linear, masks) & ~off
-    result = decompose_photo(linear, masks, open_decomposer(backend, settings), on=on, seed=seed)
+    from luxcore.decompose.photo import decompose_photo
+    from luxcore.models.backends import open_decomposer
+
     with atomic_folder(out) as folder:
+        on = burning_lamps(linear, masks) & ~off
+        model = open_decomposer(backend, settings)
+        result = decompose_photo(linear, masks, model, on=on, seed=seed)
         _write(folder, shown, result, names)
     return {
         "out": str(out),
@@ -79,16 +85,17 @@ def _plain(value: str) -> str | int | float | bool:
 
 def _read(path: Path) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w 3"]]:
     """The photo as displayed and in linear light where the exposure is 1."""
-    if path.suffix.lower() == ".exr":
-        linear = np.maximum(read_exr_image(path), 0)
-        shown = np.asarray(agx(linear), np.float32)
-    else:
-        shown = read_photo(path)
-        linear = np.asarray(agx_inverse(shown), np.float32)
-    height, width = shown.shape[:2]
+    is_linear = path.suffix.lower() == ".exr"
+    pixels = np.maximum(read_exr_image(path), 0) if is_linear else read_photo(path)
+    height, width = pixels.shape[:2]
     if min(height, width) < MIN_SIDE_PX:
         raise InputError(f"{path} is {width}x{height}; {MIN_SIDE_PX} pixels a side are the least.")
-    return shown, linear
+    # Only now, as loading it takes longer than finding out that a file cannot be used.
+    from luxcore.light.agx import agx, agx_inverse
+
+    if is_linear:
+        return np.asarray(agx(pixels), np.float32), pixels
+    return pixels, np.asarray(agx_inverse(pixels), np.float32)
 
 
 def _masks(
@@ -123,7 +130,9 @@ def _check_overlap(paths: Sequence[Path], masks: Bool[np.ndarray, "k h w"]) -> N
 def _write(
     folder: Path, shown: Float[np.ndarray, "h w 3"], result: PhotoLight, names: Sequence[str]
 ) -> None:
+    from luxcore.decompose.store import write_light
     from luxcore.explorer import write_explorer
+    from luxcore.light.agx import agx
 
     light = result.light
     write_light(folder, result, names, 1.0, np.ones(len(names), bool))

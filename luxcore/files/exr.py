@@ -135,6 +135,10 @@ def _part_pixels(path: Path, part: Any) -> np.ndarray:
     if not channels:
         raise FormatError(f"{path} has a part without channels.")
     wanted = [c for c in "RGBA" if c in channels] or list(channels)[:1]
+    if len(wanted) == 2:
+        raise FormatError(
+            f"{path} has the channels {' and '.join(wanted)}, neither grey nor colour."
+        )
     planes = [np.asarray(channels[c], np.float32) for c in wanted]
     if len({p.shape for p in planes}) != 1 or planes[0].ndim != 2 or 0 in planes[0].shape:
         raise FormatError(f"{path} has channels of different or unusable sizes.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +20,14 @@ def read_photo(path: Path) -> np.ndarray:
     CMYK is converted, alpha is dropped, 16-bit keeps its precision.
     Raises InputError (missing) or FormatError (not a picture, or cut short).
     """
-    from PIL import Image, ImageOps, UnidentifiedImageError
+    from PIL import Image, ImageOps
 
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     try:
-        with Image.open(path) as image:
+        # What Pillow has to say about odd metadata is not the one sentence that a user gets.
+        with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
             if image.width * image.height > MAX_PIXELS:
                 raise FormatError(f"{path} claims {image.width}x{image.height} pixels, too many.")
             if image.mode.startswith("I;16") or image.mode == "I":
@@ -35,7 +37,10 @@ def read_photo(path: Path) -> np.ndarray:
                 return _read_16_bit(path)
             upright = ImageOps.exif_transpose(image)
             return np.asarray(upright.convert("RGB"), np.float32) / 255.0
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+    except FormatError:
+        raise
+    # Pillow's decoders raise whatever a damaged file makes them trip over.
+    except Exception as error:
         raise FormatError(f"{path} is not a readable picture: {error}.") from error
 
 

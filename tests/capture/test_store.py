@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from luxcore.cameras import look_at
+from luxcore.cameras import camera_from_nerfstudio, look_at
 from luxcore.capture import Capture, Points, Skipped, View, load_capture, write_capture
 from luxcore.errors import FormatError, InputError
 
@@ -110,3 +110,21 @@ def test_a_failure_half_way_leaves_the_earlier_capture(tmp_path: Path) -> None:
         write_capture(tmp_path / "c", "room-1", views(), points, source="photos", metric=False)
     assert len(load_capture(tmp_path / "c").frames) == 3
     assert [f.name for f in tmp_path.iterdir()] == ["c"]
+
+
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    [
+        ({"w": float("inf")}, "not a number"),
+        ({"fl_x": 10**400}, "not a number"),
+        ({"fl_x": 1e30}, "positive focal length"),
+        (
+            {"transform_matrix": (np.eye(4) * [1, 1, 1, 1] + np.eye(4)[:, ::-1] * 1e30).tolist()},
+            "4x4",
+        ),
+    ],
+)
+def test_a_camera_beyond_float32_is_refused(change: dict, fact: str) -> None:
+    frame = {"fl_x": 50, "w": 64, "h": 48, "transform_matrix": np.eye(4).tolist()}
+    with pytest.raises(InputError, match=fact):
+        camera_from_nerfstudio(frame | change)

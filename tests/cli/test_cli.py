@@ -5,7 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from luxcore.cli import COMMANDS
 
@@ -84,3 +86,32 @@ def test_outside_a_project_says_so(tmp_path):
     done = run_lux("plan", cwd=tmp_path)
     assert done.returncode == 2
     assert "no dvc.yaml" in done.stderr
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path):
+    photo, file = tmp_path / "photo.png", tmp_path / "file"
+    Image.fromarray(np.full((32, 32, 3), 200, np.uint8)).save(photo)
+    file.write_text("mine")
+    done = run_lux("decompose", str(photo), "--mask", str(photo), "--out", str(file / "out"))
+    assert done.returncode == 1
+    assert done.stderr == f"lux: {file}: File exists.\n"
+    assert file.read_text() == "mine"
+
+
+def test_a_photo_that_cannot_be_used_is_refused_before_models_are_loaded(tmp_path):
+    (tmp_path / "photo.jpg").write_text("no picture")
+    code = (
+        "import sys\n"
+        "from luxcore.cli import app\n"
+        "from luxcore.errors import FormatError\n"
+        "try:\n"
+        "    app.main(sys.argv[1:], standalone_mode=False)\n"
+        "except FormatError as error:\n"
+        "    print(error, 'torch' in sys.modules)\n"
+    )
+    arguments = ["decompose", str(tmp_path / "photo.jpg"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.endswith("False\n"), done.stdout + done.stderr
+    assert not (tmp_path / "out").exists()

@@ -14,7 +14,7 @@ from PIL import Image
 from luxcore.cli.decompose import command
 from luxcore.decompose.burning import burning_lamps
 from luxcore.decompose.photo import decompose_photo
-from luxcore.errors import DivergedError, LuxError
+from luxcore.errors import DivergedError, InputError, LuxError
 from luxcore.files.exr import read_exr_image
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
@@ -227,3 +227,20 @@ def test_bad_weights_and_options_end_in_one_sentence(tmp_path: Path, weights: Pa
     for option, words in (("steps=3", "no option steps"), ("wide", "NAME=VALUE")):
         text = complaint(tmp_path, weights, photo, "--mask", masks[0], "--option", option)
         assert words in text
+
+
+def test_a_folder_with_the_photo_in_it_is_not_replaced(tmp_path: Path, weights: Path) -> None:
+    photo, masks = write_scene(tmp_path)
+    before = sorted(p.name for p in tmp_path.iterdir())
+    arguments = [photo, "--mask", masks[0], "--weights", weights, "--out", tmp_path]
+    call = CliRunner().invoke(command, [str(a) for a in arguments])
+    assert isinstance(call.exception, InputError)
+    assert "which would be lost" in str(call.exception)
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_a_second_call_replaces_the_first(tmp_path: Path, weights: Path) -> None:
+    photo, masks = write_scene(tmp_path)
+    run(tmp_path, weights, photo, "--mask", masks[0], "--mask", masks[1])
+    run(tmp_path, weights, photo, "--mask", masks[0])
+    assert not (tmp_path / "out" / "light_01.exr").exists()

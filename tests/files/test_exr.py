@@ -230,3 +230,13 @@ def test_damage_in_environments_is_counted_and_suns_are_kept(tmp_path):
     assert radiance[1, 1, 1] == radiance[2, 2, 0] == 0
     assert radiance[3, 3, 2] == 65504
     assert usable_radiance(tmp_path / "sun.exr")[1] == 0
+
+
+def test_two_channels_are_neither_grey_nor_colour(tmp_path: Path) -> None:
+    import OpenEXR
+
+    plane = np.ones((4, 6), np.float32)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"R": plane, "G": plane}).write(str(tmp_path / "two.exr"))
+    with pytest.raises(FormatError, match="neither grey nor colour"):
+        read_exr_image(tmp_path / "two.exr")

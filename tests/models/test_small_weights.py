@@ -13,8 +13,9 @@ from safetensors.torch import load_file, save_file
 from luxcore.errors import FormatError, InputError
 from luxcore.models.backends import open_decomposer, open_harmonizer
 from luxcore.models.interface import BackendSettings, Decomposer, Harmonizer
-from luxcore.models.small.weights import load_network, shipped_weights
-from tests.models.sketched import write_tiny_weights
+from luxcore.models.small.network import NetworkShape
+from luxcore.models.small.weights import CHANNELS, load_network, shipped_weights
+from tests.models.sketched import TINY, write_tiny_weights
 
 LIMIT_BYTES = 20_000_000
 
@@ -74,6 +75,16 @@ def test_a_missing_or_misshapen_tensor_is_named(weights: Path) -> None:
 def test_a_nonsense_shape_is_refused(weights: Path, shape: str) -> None:
     header = {"format": "lux-small-1", "kind": "sv", "shape": shape}
     with pytest.raises(FormatError):
+        load_network(rewritten(weights, {}, header), "sv")
+
+
+@pytest.mark.parametrize(
+    "change", [{"middle": 10**9}, {"widths": [8] * 40}, {"widths": [10**9]}, {"unshuffle": 10**6}]
+)
+def test_a_network_that_no_memory_holds_is_refused_at_once(weights: Path, change: dict) -> None:
+    shape = NetworkShape(*CHANNELS["sv"], TINY).as_metadata() | change
+    header = {"format": "lux-small-1", "kind": "sv", "shape": json.dumps(shape)}
+    with pytest.raises(FormatError, match="describes no usable network: it is larger than any"):
         load_network(rewritten(weights, {}, header), "sv")
 
 

@@ -21,7 +21,7 @@ def open_decomposer(settings: BackendSettings) -> Decomposer:
     """`sv_weights` is a safetensors file (default: the shipped one); options `long_side_px` and
     `estimate` (false leaves the geometry of a lone photo unknown: an ablation)."""
     net = load_network(_path(settings.sv_weights, "sv"), "sv")
-    estimator = shipped_network("geometry") if settings.options.get("estimate", True) else None
+    estimator = shipped_network("geometry") if _switch(settings, "estimate") else None
     return SmallDecomposer(net, _long_side(settings), estimator)
 
 
@@ -29,12 +29,19 @@ def open_harmonizer(settings: BackendSettings) -> Harmonizer:
     """`mv_weights` is a safetensors file (default: the shipped one); options `long_side_px` and
     `warp` (false withholds the references' warped light: an ablation)."""
     net = load_network(_path(settings.mv_weights, "mv"), "mv")
-    return SmallHarmonizer(net, _long_side(settings), bool(settings.options.get("warp", True)))
+    return SmallHarmonizer(net, _long_side(settings), _switch(settings, "warp"))
 
 
 def _path(weights: str | None, kind: str) -> Path:
     path = shipped_weights(kind) if weights is None else Path(weights)
     return path / "model.safetensors" if path.is_dir() else path
+
+
+def _switch(settings: BackendSettings, name: str) -> bool:
+    value = settings.options.get(name, True)
+    if not isinstance(value, bool):
+        raise InputError(f"{name} must be true or false, got {value}.")
+    return value
 
 
 def _long_side(settings: BackendSettings) -> int:

@@ -36,6 +36,8 @@ SHIPPED = Path(__file__).parents[1] / "weights"
 """`geometry`, `sv` and `mv` `.safetensors`, trained by the recipe in docs/models.md."""
 
 MAX_BYTES = 200_000_000
+MAX_COUNT, MAX_DEPTH = 512, 16
+"""Of channels, and of grids and middle blocks; far above any network that fits `MAX_BYTES`."""
 
 
 def shipped_weights(kind: str) -> Path:
@@ -78,6 +80,7 @@ def load_network(path: Path, kind: str) -> UNet:
     try:
         fields = json.loads(metadata["shape"])
         shape = NetworkShape(**{**fields, "widths": tuple(fields["widths"])})
+        _check_shape(shape)
         net = network_class(kind)(shape)
     except (KeyError, TypeError, ValueError, RuntimeError, ZeroDivisionError) as error:
         raise FormatError(f"{path} describes no usable network: {error}.") from error
@@ -89,6 +92,15 @@ def load_network(path: Path, kind: str) -> UNet:
     _check_tensors(path, tensors, net)
     net.load_state_dict({name: tensor.float() for name, tensor in tensors.items()})
     return channels_last(net).eval()
+
+
+def _check_shape(shape: NetworkShape) -> None:
+    """Raises ValueError before a network is built that no memory holds."""
+    counts = [shape.inputs, shape.outputs, shape.unshuffle, shape.heads, shape.middle]
+    counts += [shape.attending, shape.together, len(shape.widths), *shape.widths]
+    deep = max(shape.middle, len(shape.widths)) > MAX_DEPTH
+    if deep or max(counts) > MAX_COUNT or min(counts) < 0:
+        raise ValueError(f"it is larger than any that fits {MAX_BYTES} bytes")
 
 
 def _read(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
