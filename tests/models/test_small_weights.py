@@ -112,6 +112,8 @@ def test_backends_are_opened_by_name(tmp_path: Path) -> None:
         open_decomposer("small", BackendSettings(str(sv), options={"depth": 3}))
     with pytest.raises(InputError, match="long_side_px must be"):
         open_decomposer("small", BackendSettings(str(sv), options={"long_side_px": 5}))
+    with pytest.raises(InputError, match="estimate must be true or false, got maybe"):
+        open_decomposer("small", BackendSettings(str(sv), options={"estimate": "maybe"}))
 
 
 def test_model_cards_name_what_the_weights_came_from() -> None:
