@@ -48,9 +48,6 @@ LAYOUTS: dict[str, Layout] = {
     "colmap-text": "colmap-text",
 }
 
-CAPTURE_NAMES = ("images", "transforms.json", "points.ply", "sparse")
-"""What the folders of `LAYOUTS` hold."""
-
 
 def _described() -> str:
     # \b keeps click from wrapping the list into one paragraph.
@@ -117,7 +114,8 @@ def _check_options(
         raise InputError(f"--view is for exr, not for {form}.")
     suffix = FORMATS[form].suffix
     if lamps or not suffix:
-        check_out_folder(out, (f"[0-9][0-9]_*{suffix}",) if lamps else CAPTURE_NAMES)
+        # A folder of photos looks like one that was exported, so that must be a new one.
+        check_out_folder(out, (f"[0-9][0-9]_*{suffix}",) if lamps else ())
     elif out.suffix.lower() != suffix:
         raise InputError(f"{out} must end in {suffix}.")
 

@@ -38,7 +38,7 @@ def decompose_file(
 
     Raises InputError or FormatError for files that cannot be used; `out` is then left as it was.
     """
-    check_out_folder(out, WRITTEN)
+    check_out_folder(out, WRITTEN, mark="lights.json")
     shown, linear = _read(photo_path)
     masks, names, off = _masks(shown, mask_paths, off_paths)
     from luxcore.decompose.photo import decompose_photo

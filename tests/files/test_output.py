@@ -31,6 +31,14 @@ def test_anything_else_is_kept(tmp_path: Path) -> None:
         check_out_folder(tmp_path / "photo.jpg", NAMES)
 
 
+def test_without_its_mark_a_folder_is_somebody_elses(tmp_path: Path) -> None:
+    (tmp_path / "light_00.exr").touch()
+    with pytest.raises(InputError, match=r"holds light_00.exr"):
+        check_out_folder(tmp_path, NAMES, mark="lights.json")
+    (tmp_path / "lights.json").touch()
+    check_out_folder(tmp_path, NAMES, mark="lights.json")
+
+
 def test_the_folder_that_one_stands_in_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
