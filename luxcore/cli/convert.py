@@ -41,7 +41,10 @@ def command(
     from luxcore.data.compact import holds_compact, list_rendered
     from luxcore.data.convert import compact_to_public, cut_photos, public_to_compact
     from luxcore.data.public_writer import write_shards
+    from luxcore.files.output import check_out_folder
 
+    # Scenes and rooms are written whole: one of the same name would be replaced.
+    check_out_folder(out)
     if photos is not None:
         size = (photo_size, photo_size)
         folders = cut_photos(source, out, photos=photos, size=size, seed=seed)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--camera", type=click.Path(path_type=Path), help="One nerfstudio frame as JSON.")
 @click.option("--view", type=int, help="Instead of --camera: that of this photo, from 0.")
-@click.option("--ev", default=0.0, show_default=True, help="Stops brighter, for PNG.")
+@click.option("--ev", default=0.0, show_default=True, type=click.FloatRange(-32, 32),
+              help="Stops brighter, for PNG.")  # fmt: skip
 @click.option("--out", required=True, type=click.Path(path_type=Path), help=".png or .exr (linear)")
 def command(
     scene: Path,
@@ -38,6 +39,8 @@ def command(
 
     PNG is AgX at the scene's exposure; EXR holds linear radiance.
     """
+    if ev != ev:
+        raise InputError("--ev must be a number of stops, got nan.")
     check_out(out)
     from luxcore.splats.scene_files import check_scene
 

@@ -30,6 +30,8 @@ def read_photo(path: Path) -> np.ndarray:
         with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
             if image.width * image.height > MAX_PIXELS:
                 raise FormatError(f"{path} claims {image.width}x{image.height} pixels, too many.")
+            if image.mode == "F":
+                raise FormatError(f"{path} holds floating point values; give linear light as EXR.")
             if image.mode.startswith("I;16") or image.mode == "I":
                 grey = np.asarray(image, np.float32) / 65535.0
                 return np.repeat(np.clip(grey, 0, 1)[..., None], 3, axis=2)

@@ -86,3 +86,12 @@ def test_a_folder_of_neither_form_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         convert(tmp_path / "nowhere", "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_scenes_of_the_same_name_are_not_replaced(tmp_path: Path) -> None:
+    mine = tmp_path / "out" / "000000" / "mine.txt"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("kept")
+    call = CliRunner().invoke(command, [str(tmp_path), "--out", str(tmp_path / "out")])
+    assert "which would be lost" in str(call.exception)
+    assert mine.read_text() == "kept"

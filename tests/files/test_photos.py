@@ -36,3 +36,10 @@ def test_flipped_bytes_are_read_or_refused(tmp_path: Path, suffix: str) -> None:
         path.write_bytes(data)
         with suppress(FormatError):
             assert read_photo(path).shape[2] == 3
+
+
+def test_floating_point_is_no_display_picture(tmp_path: Path) -> None:
+    path = tmp_path / "linear.tif"
+    Image.fromarray(np.full((8, 8), 0.5, np.float32)).save(path)
+    with pytest.raises(FormatError, match="give linear light as EXR"):
+        read_photo(path)
