@@ -134,7 +134,9 @@ def _part_pixels(path: Path, part: Any) -> np.ndarray:
     channels = {name.split(".")[-1].upper(): c.pixels for name, c in part.channels.items()}
     if not channels:
         raise FormatError(f"{path} has a part without channels.")
-    wanted = [c for c in "RGBA" if c in channels] or list(channels)[:1]
+    colour = [c for c in "RGB" if c in channels]
+    grey = [c for c in channels if c != "A"] or list(channels)
+    wanted = [*colour, *(["A"] if "A" in channels else [])] if colour else grey[:1]
     if len(wanted) == 2:
         raise FormatError(
             f"{path} has the channels {' and '.join(wanted)}, neither grey nor colour."

@@ -240,3 +240,12 @@ def test_two_channels_are_neither_grey_nor_colour(tmp_path: Path) -> None:
     OpenEXR.File(header, {"R": plane, "G": plane}).write(str(tmp_path / "two.exr"))
     with pytest.raises(FormatError, match="neither grey nor colour"):
         read_exr_image(tmp_path / "two.exr")
+
+
+def test_alpha_is_not_the_picture(tmp_path: Path) -> None:
+    import OpenEXR
+
+    planes = {"Y": np.full((4, 6), 0.25, np.float32), "A": np.ones((4, 6), np.float32)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, planes).write(str(tmp_path / "grey.exr"))
+    np.testing.assert_array_equal(read_exr_image(tmp_path / "grey.exr"), 0.25)
