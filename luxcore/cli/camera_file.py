@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from luxcore.errors import FormatError, InputError
+from luxcore.files.input import check_input_file
 
 if TYPE_CHECKING:
     from luxcore.cameras import Camera
@@ -22,8 +23,7 @@ def read_camera(path: Path, view: int = 0) -> Camera:
     """
     from luxcore.cameras import camera_from_nerfstudio
 
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+    check_input_file(path)
     if path.stat().st_size > _MAX_BYTES:
         raise FormatError(f"{path} is too large for a camera.")
     try:

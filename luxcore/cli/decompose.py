@@ -15,8 +15,8 @@ import click
     multiple=True,
     type=click.Path(path_type=Path),
     metavar="M.png",
-    help="A lamp: white on black, as large as the photo. Repeat for each lamp; without "
-    "any, lamps are proposed.",
+    help="A lamp: white on black or opaque on transparent, as large as the photo. Repeat for each "
+    "lamp; without any, lamps are proposed.",
 )
 @click.option(
     "--off",

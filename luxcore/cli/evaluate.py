@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+from luxcore.errors import InputError
+from luxcore.files.input import check_input_file
+
 
 @click.command("evaluate")
 @click.option(
@@ -76,7 +79,8 @@ def command(
     as_json: bool,
 ) -> None:
     """Score the models on DATASET and print both tables, in the paper's form."""
-    from luxcore.errors import InputError
+    _check_given(dataset, public_cases, public_cameras)
+
     from luxcore.evaluate.dataset import evaluation_views
     from luxcore.evaluate.public_run import evaluate_public
     from luxcore.evaluate.run import evaluate_models
@@ -87,8 +91,6 @@ def command(
         cases=cases, groups=groups, size_px=size, backend=backend, mv_backend=mv_backend
     )
     weights = {"sv_weights": sv_weights, "mv_weights": mv_weights}
-    if (public_cases is None) != (public_cameras is None):
-        raise InputError("--public-cases and --public-cameras go together.")
     if public_cases is not None and public_cameras is not None:
         metrics = evaluate_public(dataset, public_cases, public_cameras, out, settings, **weights)
     else:
@@ -102,3 +104,14 @@ def command(
         return
     for table in sorted((out / "tables").glob("*.md")):
         click.echo(table.read_text(encoding="utf-8"))
+
+
+def _check_given(dataset: Path, public_cases: Path | None, public_cameras: Path | None) -> None:
+    """What can be said before the models' libraries are loaded, which takes seconds."""
+    if (public_cases is None) != (public_cameras is None):
+        raise InputError("--public-cases and --public-cameras go together.")
+    if not dataset.exists():
+        raise InputError(f"{dataset} does not exist.")
+    for path in (public_cases, public_cameras):
+        if path is not None:
+            check_input_file(path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from luxcore.errors import InputError
+from luxcore.files.input import check_input_file
 
 
 @click.group(name="hdr")
@@ -26,6 +27,8 @@ def merge(photos: tuple[Path, ...], times: str | None, out: Path, as_json: bool)
     """
     if out.suffix.lower() != ".exr":
         raise InputError(f"{out} must end in .exr.")
+    for photo in photos:
+        check_input_file(photo)
 
     import json
 

@@ -24,10 +24,12 @@ def render(file: Path, camera: Path, out: Path) -> None:
     check_out(out)
 
     from luxcore.splats.ply import read_ply
-    from luxcore.splats.relighting import splat_image
 
     where = read_camera(camera)
     gaussians = read_ply(file)
+    # Only now, as loading it takes longer than finding out that a file cannot be used.
+    from luxcore.splats.relighting import splat_image
+
     image = splat_image(gaussians, where)
     write_image(out, None, image)
     click.echo(

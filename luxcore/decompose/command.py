@@ -110,9 +110,16 @@ def _masks(
         found = propose_photo(shown)
         return np.stack(found), [f"lamp_{k}" for k in range(len(found))], np.zeros(len(found), bool)
     masks = np.stack([read_mask(path, (height, width)) for path in paths])
+    _check_part_of_photo(paths, masks)
     _check_overlap(paths, masks)
     off = np.arange(len(paths)) >= len(mask_paths)
     return masks, [path.stem for path in paths], off
+
+
+def _check_part_of_photo(paths: Sequence[Path], masks: Bool[np.ndarray, "k h w"]) -> None:
+    for path, mask in zip(paths, masks, strict=True):
+        if mask.all():
+            raise InputError(f"{path} covers the whole photo: draw the lamp alone, white on black.")
 
 
 def _check_overlap(paths: Sequence[Path], masks: Bool[np.ndarray, "k h w"]) -> None:

@@ -21,6 +21,7 @@ from luxcore.data.public_names import SCENE_ID
 from luxcore.data.public_reader import PublicScene
 from luxcore.errors import FormatError, InputError
 from luxcore.evaluate.cases import LampCase
+from luxcore.files.input import check_input_file
 from luxcore.progress import progress
 
 REFERENCE_VIEW = 0
@@ -214,8 +215,7 @@ def _scene_id(name: str) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+    check_input_file(path)
     if path.stat().st_size > MAX_BYTES:
         raise FormatError(f"{path} is too large for a list.")
     try:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError, InputError, LuxError
 from luxcore.files.atomic import atomic_file
+from luxcore.files.input import check_input_file
+from luxcore.files.quiet import quiet
 
 MAX_SIDE = 32_768
 """Largest width or height, in pixels, that a header may claim before anything is allocated."""
@@ -23,6 +25,12 @@ HALF_MAX = 65_504.0
 _HALF_ZERO = 2.0**-25
 """Half precision rounds this and everything smaller to 0."""
 _RGB = {1: "Y", 3: "RGB", 4: "RGBA"}
+_BEAUTY = "Combined"
+_COMPOSITE = "Composite.Combined"
+"""What Blender's compositor made of the beauty passes of all view layers."""
+
+Channels = dict[str, np.ndarray]
+"""Planes [H, W] of one layer by their letters in capitals."""
 
 
 @cache
@@ -40,7 +48,8 @@ def write_exr(path: Path, layers: Mapping[str, np.ndarray], *, half: bool = True
 
     Returns the number of values that half precision had to clip to ±65504 or let vanish to 0.
     Depth-like layers that must not lose precision: pass float64 arrays' layers with `half=False`.
-    Raises InputError when a layer is empty, not finite, or of a different size than the others.
+    Raises InputError when a layer is empty, not finite, or of a different size than the others,
+    LuxError when the disk takes no more.
     """
     exr = _library()
     parts, clipped, size = [], 0, None
@@ -62,7 +71,11 @@ def write_exr(path: Path, layers: Mapping[str, np.ndarray], *, half: bool = True
     if not parts:
         raise InputError(f"{path} would hold no layers.")
     with atomic_file(Path(path)) as temporary:
-        exr.File(parts).write(str(temporary))
+        try:
+            exr.File(parts).write(str(temporary))
+        except RuntimeError as error:
+            fact = str(error).replace(str(temporary), str(path)).rstrip(".")
+            raise LuxError(f"{path} cannot be written: {fact}.") from error
     return clipped
 
 
@@ -70,36 +83,59 @@ def read_exr(path: Path, *, finite: bool = True) -> dict[str, np.ndarray]:
     """Layers by part name, each [H, W, C] float32, C in 1, 3, 4 (channels R, G, B, A or Y first).
 
     A single unnamed part is called "image"; what is read is the data window, wherever it lies in
-    the display window. With `finite`, NaN and infinity are damage. Raises InputError (missing) or
-    FormatError, naming the file and the fact, before memory is taken for what a header claims.
+    the display window. Of several layers in one part the picture is taken, see `read_exr_image`.
+    With `finite`, NaN and infinity are damage. Raises InputError (missing) or FormatError, naming
+    the file and the fact, before memory is taken for what a header claims.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
-    try:
-        _check_header(path)
-        parts = list(_library().File(str(path), separate_channels=True).parts)
-        layers = {(p.name() or "image"): _part_pixels(path, p) for p in parts}
-    except (RuntimeError, ValueError, IndexError, MemoryError, UnicodeDecodeError) as error:
-        fact = " ".join(str(error).split())
-        raise FormatError(f"{path} is not a readable OpenEXR image: {fact}.") from error
-    if not layers:
-        raise FormatError(f"{path} is truncated or damaged: it holds no readable part.")
-    if len(layers) != len(parts):
-        raise FormatError(f"{path} holds two parts of the same name.")
+    layers = {
+        (part.name() or "image"): _pixels(path, _picture(path, _layers(part))[1])
+        for part in _parts(path)
+    }
     if finite:
         _check_finite(path, layers)
     return layers
 
 
-def read_exr_image(path: Path) -> np.ndarray:
-    """The first layer of an EXR as [H, W, 3] float32 linear radiance."""
-    pixels = next(iter(read_exr(path).values()))
+def read_exr_image(path: Path, *, finite: bool = True) -> np.ndarray:
+    """The picture in an EXR as [H, W, 3] float32 linear radiance.
+
+    Of several layers, in one part or in many, it is the unnamed one, else Combined (Blender's
+    beauty pass, as in ViewLayer.Combined.R), else the only one in colour. Raises as `read_exr`
+    does, and FormatError where that leaves a choice or a layer such as depth, which is no picture.
+    """
+    path = Path(path)
+    name, channels = _picture(path, _named_layers(_parts(path)))
+    if not (_is_colour(channels) or _is_grey(channels)):
+        raise _neither(path, list(channels))
+    pixels = _pixels(path, channels)
+    if finite:
+        _check_finite(path, {name or "image": pixels})
     return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
 
 
-def _check_header(path: Path) -> None:
-    """Refuse what the header alone shows to be hostile. Raises FormatError."""
+def _parts(path: Path) -> list[Any]:
+    """All parts with their pixels. Raises InputError or FormatError."""
+    check_input_file(path)
+    try:
+        with quiet():
+            declared = _check_header(path)
+            parts = list(_library().File(str(path), separate_channels=True).parts)
+    except (RuntimeError, ValueError, IndexError, MemoryError, UnicodeDecodeError) as error:
+        fact = " ".join(str(error).split())
+        raise FormatError(f"{path} is not a readable OpenEXR image: {fact}.") from error
+    # The library leaves out what it cannot read.
+    if not parts or len(parts) != declared:
+        raise FormatError(
+            f"{path} is truncated or damaged: {len(parts)} of its {declared} parts can be read."
+        )
+    if len({part.name() for part in parts}) != len(parts):
+        raise FormatError(f"{path} holds two parts of the same name.")
+    return parts
+
+
+def _check_header(path: Path) -> int:
+    """How many parts it declares. Raises FormatError for what it alone shows to be hostile."""
     exr = _library()
     headers = [part.header for part in exr.File(str(path), header_only=True).parts]
     if len(headers) > MAX_PARTS:
@@ -121,6 +157,7 @@ def _check_header(path: Path) -> None:
     size = path.stat().st_size
     if claimed > MAX_EXPANSION * size:
         raise FormatError(f"{path} has {size} bytes and claims pixels of {claimed} bytes.")
+    return len(headers)
 
 
 def _check_finite(path: Path, layers: Mapping[str, np.ndarray]) -> None:
@@ -130,21 +167,77 @@ def _check_finite(path: Path, layers: Mapping[str, np.ndarray]) -> None:
             raise FormatError(f"{path}: layer {name} has {bad} values that are not finite.")
 
 
-def _part_pixels(path: Path, part: Any) -> np.ndarray:
-    channels = {name.split(".")[-1].upper(): c.pixels for name, c in part.channels.items()}
-    if not channels:
+def _named_layers(parts: Sequence[Any]) -> dict[str, Channels]:
+    """The layers of all parts; the name of a part counts only beside others."""
+    found = {}
+    for part in parts:
+        owner = part.name() if len(parts) > 1 else ""
+        for name, channels in _layers(part).items():
+            # Blender repeats a part's name in its channels.
+            found[name if name.startswith(owner) else f"{owner}.{name}".rstrip(".")] = channels
+    return found
+
+
+def _layers(part: Any) -> dict[str, Channels]:
+    """Channels by what stands before their last dot: "ViewLayer.Combined.R" is R of Combined."""
+    layers: dict[str, Channels] = {}
+    for full_name, channel in part.channels.items():
+        name, _, letter = full_name.rpartition(".")
+        layers.setdefault(name, {})[letter.upper()] = channel.pixels
+    return layers
+
+
+def _picture(path: Path, layers: Mapping[str, Channels]) -> tuple[str, Channels]:
+    """The layer that is the picture, with its name; see `read_exr_image`. Raises FormatError."""
+    if not layers:
         raise FormatError(f"{path} has a part without channels.")
-    colour = [c for c in "RGB" if c in channels]
-    grey = [c for c in channels if c != "A"] or list(channels)
-    wanted = [*colour, *(["A"] if "A" in channels else [])] if colour else grey[:1]
-    if len(wanted) == 2:
-        raise FormatError(
-            f"{path} has the channels {' and '.join(wanted)}, neither grey nor colour."
-        )
+    colour = [name for name, channels in layers.items() if _is_colour(channels)]
+    choice = colour or list(layers)
+    for wanted in ("", _BEAUTY):
+        named = [name for name in choice if name.rpartition(".")[2] == wanted]
+        if _COMPOSITE in named:
+            named = [_COMPOSITE]
+        if len(named) == 1:
+            return named[0], layers[named[0]]
+    if len(choice) != 1:
+        raise FormatError(f"{path} holds several layers, {_listed(choice)}; give a file of one.")
+    return choice[0], layers[choice[0]]
+
+
+def _pixels(path: Path, channels: Channels) -> np.ndarray:
+    """[H, W, 1|3|4] float32 of one layer. Raises FormatError."""
+    others = [c for c in channels if c != "A"] or list(channels)
+    if _is_colour(channels):
+        wanted = [c for c in "RGBA" if c in channels]
+    elif _is_grey(channels):
+        wanted = ["Y"]
+    elif len(others) == 1:
+        wanted = others
+    else:
+        raise _neither(path, others)
     planes = [np.asarray(channels[c], np.float32) for c in wanted]
     if len({p.shape for p in planes}) != 1 or planes[0].ndim != 2 or 0 in planes[0].shape:
         raise FormatError(f"{path} has channels of different or unusable sizes.")
     return np.stack(planes, axis=-1)
+
+
+def _is_colour(channels: Channels) -> bool:
+    return channels.keys() >= set("RGB")
+
+
+def _is_grey(channels: Channels) -> bool:
+    # Y beside X is a direction, not luminance.
+    return "Y" in channels and "X" not in channels
+
+
+def _neither(path: Path, channels: Sequence[str]) -> FormatError:
+    noun = "channel" if len(channels) == 1 else "channels"
+    return FormatError(f"{path} has the {noun} {_listed(channels)}, neither grey nor colour.")
+
+
+def _listed(names: Sequence[str]) -> str:
+    *most, last = (name or "(unnamed)" for name in names)
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def _check_layer(path: Path, name: str, pixels: np.ndarray, size: tuple | None) -> None:

@@ -7,18 +7,20 @@ The response is recovered by OpenCV's CalibrateDebevec (Debevec and Malik 1997);
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.errors import FormatError, InputError
-from luxcore.files.photos import read_photo
+from luxcore.errors import InputError
+from luxcore.files.photos import open_picture, read_photo
 from luxcore.light.hdr import Merged, merge_brackets
 from luxcore.light.response import CurveResponse
 
 SAMPLES = 100
+MIN_SIDE_PX, MAX_ASPECT = 10, 100
+"""OpenCV spreads the samples over a grid of the picture's proportions, one to a pixel at most."""
+SHORTEST_S, LONGEST_S = 1e-9, 1e6
 SMOOTHNESS = 20.0
 _EXIF_FOLDER = 0x8769
 _EXPOSURE_TIME, _F_NUMBER, _SENSITIVITY = 33434, 33437, 34855
@@ -28,7 +30,8 @@ def merge_photos(paths: Sequence[Path], times_s: Sequence[float] | None = None) 
     """Linear radiance of a bracket, 1 at the middle value of a photo exposed for one second.
 
     `times_s` are exposure times in seconds; without them EXIF gives time, aperture and sensitivity.
-    Raises InputError for one photo, mixed sizes, missing or equal times, FormatError for no photo.
+    Raises InputError for one photo, mixed or too small sizes, missing or equal times, FormatError
+    for no photo.
     """
     if len(paths) < 2:
         raise InputError(f"a bracket needs at least two photos, got {len(paths)}.")
@@ -45,8 +48,20 @@ def merge_photos(paths: Sequence[Path], times_s: Sequence[float] | None = None) 
                 f"{path} is {photo.shape[1]}x{photo.shape[0]}, "
                 f"{paths[0]} is {photos[0].shape[1]}x{photos[0].shape[0]}."
             )
+    _check_size(paths[0], photos[0])
     response = CurveResponse(recover_response(photos, times_s))
     return merge_brackets(photos, np.log2(np.asarray(times_s, float)).tolist(), response)
+
+
+def _check_size(path: Path, photo: np.ndarray) -> None:
+    """Refuse what the response's grid of pixels does not fit on."""
+    height, width = photo.shape[:2]
+    short, long = sorted((height, width))
+    if short < MIN_SIDE_PX or long > MAX_ASPECT * short:
+        raise InputError(
+            f"{path} is {width}x{height}; a bracket needs at least {MIN_SIDE_PX} pixels a side, "
+            f"and none longer than {MAX_ASPECT} times the other."
+        )
 
 
 def recover_response(
@@ -69,16 +84,8 @@ def recover_response(
 
 def exif_exposure(path: Path) -> float:
     """Seconds of exposure at f/1 and ISO 100 from EXIF. Raises InputError if there is no time."""
-    from PIL import Image, UnidentifiedImageError
-
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
-    try:
-        with Image.open(path) as image:
-            tags = image.getexif().get_ifd(_EXIF_FOLDER)
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise FormatError(f"{path} is not a readable picture: {error}.") from error
+    with open_picture(path) as image:
+        tags = image.getexif().get_ifd(_EXIF_FOLDER)
     time = _number(tags.get(_EXPOSURE_TIME))
     if time is None:
         raise InputError(f"{path} has no exposure time in its EXIF data; give --times.")
@@ -90,14 +97,23 @@ def parse_times(text: str) -> list[float]:
     """Seconds of "1/30,1/60,0.5". Raises InputError."""
     times = []
     for item in text.split(","):
+        shown = f"{item.strip()!r:.80}"
         try:
-            time = float(Fraction(item.strip()))
+            time = _seconds(item)
         except (ValueError, ZeroDivisionError) as error:
-            raise InputError(f"exposure time {item.strip()!r} is not like 1/30 or 0.5.") from error
-        if not 0 < time < 1e6:
-            raise InputError(f"exposure time {item.strip()!r} must be positive seconds.")
+            raise InputError(f"exposure time {shown} is not like 1/30 or 0.5.") from error
+        if not SHORTEST_S <= time <= LONGEST_S:
+            raise InputError(
+                f"exposure time {shown} must be {SHORTEST_S:g} to {LONGEST_S:g} seconds."
+            )
         times.append(time)
     return times
+
+
+def _seconds(text: str) -> float:
+    # Not a Fraction: of 1e-999999999 that calculates every digit.
+    over, slash, under = text.partition("/")
+    return float(over) / float(under) if slash else float(text)
 
 
 def _number(value: object) -> float | None:

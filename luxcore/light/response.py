@@ -8,8 +8,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.light.agx import agx_inverse
-
 
 @runtime_checkable
 class Response(Protocol):
@@ -25,6 +23,9 @@ class AgxResponse:
     """Pictures made with AgX. Its channels depend on each other, so it has no curve per channel."""
 
     def linear(self, display: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w 3"]:
+        # Brackets of a camera do without, and torch, which AgX brings, takes seconds to load.
+        from luxcore.light.agx import agx_inverse
+
         return agx_inverse(display)
 
 

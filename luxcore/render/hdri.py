@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.errors import FormatError, InputError
-from luxcore.files.exr import HALF_MAX, read_exr
+from luxcore.files.exr import HALF_MAX, read_exr_image
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
@@ -65,8 +65,7 @@ def usable_radiance(path: Path) -> tuple[np.ndarray, int]:
 def _read_hdri(path: Path) -> np.ndarray:
     """[h, w, 3] linear radiance of an .exr or a Radiance .hdr."""
     if path.suffix != ".hdr":
-        pixels = next(iter(read_exr(path, finite=False).values()))
-        return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
+        return read_exr_image(path, finite=False)
     import cv2
 
     pixels = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError
 from luxcore.files.atomic import atomic_file
+from luxcore.files.input import check_input_file
 from luxcore.splats.gaussians import Gaussians
 from luxcore.splats.ply_header import PlyHeader, read_header
 
@@ -55,8 +56,7 @@ def read_ply(path: Path) -> Gaussians:
     more than it holds (checked before anything is allocated), or has values that are not finite.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+    check_input_file(path)
     with open(path, "rb") as stream:
         header = read_header(stream, path, path.stat().st_size)
         _check_names(path, header)

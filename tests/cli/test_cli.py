@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -73,6 +74,10 @@ def test_help_names_every_command():
         (["run", "rendr"], "did you mean render?"),
         (["schedule"], "--cron"),
         (["remix", "no-such-folder", "--out", "x"], "no-such-folder"),
+        (["relight", "scene", "--ev", "nan", "--out", "x.png"], "'nan' is not a finite number"),
+        (["relight", "scene", "--ev", "33", "--out", "x.png"], "range"),
+        (["render", "--rooms", "1", "--unit-m", "inf", "--out", "x"], "'inf' is not a finite"),
+        (["render", "--rooms", "1", "--unit-m", "nan", "--out", "x"], "'nan' is not a finite"),
     ],
 )
 def test_a_mistake_is_one_sentence_with_code_2(project_root, arguments, fact):
@@ -90,7 +95,9 @@ def test_outside_a_project_says_so(tmp_path):
 
 def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path):
     photo, file = tmp_path / "photo.png", tmp_path / "file"
-    Image.fromarray(np.full((32, 32, 3), 200, np.uint8)).save(photo)
+    pixels = np.zeros((32, 32, 3), np.uint8)
+    pixels[8:16, 8:16] = 200
+    Image.fromarray(pixels).save(photo)
     file.write_text("mine")
     done = run_lux("decompose", str(photo), "--mask", str(photo), "--out", str(file / "out"))
     assert done.returncode == 1
@@ -115,3 +122,47 @@ def test_a_photo_that_cannot_be_used_is_refused_before_models_are_loaded(tmp_pat
     )
     assert done.stdout.endswith("False\n"), done.stdout + done.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fact"),
+    [
+        (["splat", "render", "no.ply", "--camera", "camera.json", "--out", "x.png"], "no.ply does"),
+        (["splat", "render", "folder", "--camera", "camera.json", "--out", "x.png"], "folder is a"),
+        (["splat", "render", "no.ply", "--camera", "folder", "--out", "x.png"], "folder is a"),
+        (["hdr", "merge", "no.jpg", "no.png", "--out", "x.exr"], "no.jpg does not exist"),
+        (
+            ["hdr", "merge", "camera.json", "camera.json", "--times", "1,1e400", "--out", "x.exr"],
+            "'1e400'",
+        ),
+        (["evaluate", "--dataset", "none"], "none does not exist"),
+        (
+            ["evaluate", "--dataset", "folder", "--public-cases", "c", "--public-cameras", "d"],
+            "c does not exist",
+        ),
+        (["decompose", "folder", "--out", "x"], "folder is a folder, not a file"),
+    ],
+)
+def test_what_is_missing_is_said_before_anything_heavy_is_loaded(tmp_path, arguments, fact):
+    (tmp_path / "folder").mkdir()
+    frame = {"fl_x": 9, "fl_y": 9, "cx": 4, "cy": 4, "w": 8, "h": 8}
+    frame["transform_matrix"] = np.eye(4).tolist()
+    (tmp_path / "camera.json").write_text(json.dumps(frame))
+    code = (
+        "import sys\n"
+        "from luxcore.cli import app\n"
+        "from luxcore.errors import InputError\n"
+        "try:\n"
+        "    app.main(sys.argv[1:], standalone_mode=False)\n"
+        "except InputError as error:\n"
+        f"    print(error, sorted({HEAVY - {'OpenEXR'}!r} & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert fact in done.stdout, done.stdout + done.stderr
+    assert done.stdout.endswith(" []\n")

@@ -214,6 +214,10 @@ def test_bad_masks_end_in_one_sentence(tmp_path: Path, weights: Path) -> None:
     assert "small.png is 48x48, the photo is 96x96" in complaint(
         tmp_path, weights, photo, "--mask", tmp_path / "small.png"
     )
+    write_png(tmp_path / "all.png", np.ones((96, 96)))
+    assert "all.png covers the whole photo" in complaint(
+        tmp_path, weights, photo, "--mask", tmp_path / "all.png"
+    )
     assert "overlap by more than half" in complaint(
         tmp_path, weights, photo, "--mask", masks[0], "--mask", masks[0]
     )

@@ -1,6 +1,7 @@
 """OpenEXR files from strangers, and what half precision does to light."""
 
 import json
+import resource
 import struct
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError, InputError, LuxError
 from luxcore.files.exr import HALF_MAX, read_exr, read_exr_image, write_exr
 
 
@@ -200,6 +201,19 @@ def test_what_cannot_be_written_is_said_and_leaves_nothing(tmp_path, layers, fac
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_disk_that_takes_no_more_is_said_of_the_file(tmp_path):
+    path = tmp_path / "big.exr"
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(LuxError, match=r"/big\.exr cannot be written") as caught:
+            write_exr(path, {"image": np.random.default_rng(0).random((100, 100, 3))})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert "/.big" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_library_is_not_older_than_its_known_holes():
     import OpenEXR
 
@@ -249,3 +263,80 @@ def test_alpha_is_not_the_picture(tmp_path: Path) -> None:
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, planes).write(str(tmp_path / "grey.exr"))
     np.testing.assert_array_equal(read_exr_image(tmp_path / "grey.exr"), 0.25)
+
+
+def save_channels(path: Path, values: dict[str, float]) -> Path:
+    """One part with a channel of one value for each name."""
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    planes = {name: np.full((4, 6), value, np.float32) for name, value in values.items()}
+    OpenEXR.File(header, planes).write(str(path))
+    return path
+
+
+def layer(name: str, value: float) -> dict[str, float]:
+    return {f"{name}.{channel}": value for channel in "RGB"}
+
+
+BLENDER = {**layer("ViewLayer.Combined", 0.5), "ViewLayer.Depth.Z": 3.0}
+BLENDER |= {**layer("ViewLayer.DiffCol", 0.9), **layer("ViewLayer.Noisy", 0.1)}
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"R": 0.5, "G": 0.5, "B": 0.5, **layer("fill", 0.9), "Z": 3.0},
+        BLENDER,
+        {**BLENDER, **layer("ViewLayer.Combined", 0.7), **layer("Composite.Combined", 0.5)},
+        {**layer("beauty", 0.5), "depth.Z": 3.0, "normal.X": 1.0, "normal.Y": 0.0},
+        {"Z": 3.0, **layer("beauty", 0.5)},
+    ],
+    ids=["unnamed", "Blender", "composite", "only colour", "beside depth"],
+)
+def test_of_several_layers_the_picture_is_taken(tmp_path: Path, values: dict[str, float]) -> None:
+    path = save_channels(tmp_path / "layers.exr", values)
+    np.testing.assert_array_equal(read_exr_image(path), 0.5)
+    np.testing.assert_array_equal(read_exr(path)["image"][..., :3], 0.5)
+
+
+def test_layers_that_leave_a_choice_are_named(tmp_path: Path) -> None:
+    path = save_channels(tmp_path / "two.exr", {**layer("key", 0.2), **layer("fill", 0.3)})
+    with pytest.raises(FormatError, match=r"two\.exr holds several layers, fill and key"):
+        read_exr_image(path)
+    write_exr(tmp_path / "parts.exr", {n: np.ones((4, 6, 3)) for n in ("ambient", "desk", "wall")})
+    with pytest.raises(FormatError, match="several layers, ambient, desk and wall"):
+        read_exr_image(tmp_path / "parts.exr")
+    assert list(read_exr(tmp_path / "parts.exr")) == ["ambient", "desk", "wall"]
+
+
+def test_of_several_parts_the_beauty_pass_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "parts.exr"
+    names = ("ViewLayer.Diffuse Color", "ViewLayer.Combined", "ViewLayer.Depth")
+    write_exr(path, {name: np.full((4, 6, 3), i / 2) for i, name in enumerate(names)})
+    np.testing.assert_array_equal(read_exr_image(path), 0.5)
+
+
+@pytest.mark.parametrize("names", ["Z", "XYZ"])
+def test_depth_and_directions_are_no_picture(tmp_path: Path, names: str) -> None:
+    path = save_channels(tmp_path / "depth.exr", dict.fromkeys(names, 3.0))
+    with pytest.raises(FormatError, match=r"depth\.exr has the channels? .*Z, neither grey nor"):
+        read_exr_image(path)
+
+
+def test_a_part_that_cannot_be_read_is_damage_and_the_library_is_silent(tmp_path: Path, capfd):
+    rng = np.random.default_rng(0)
+    path = tmp_path / "cut.exr"
+    write_exr(path, {name: rng.random((24, 32, 3)) for name in "abc"})
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(FormatError, match="2 of its 3 parts can be read"):
+        read_exr(path)
+    path.write_bytes(path.read_bytes()[:-4000])
+    with pytest.raises(FormatError, match=r"cut\.exr"):
+        read_exr(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_folder_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a folder, not a file"):
+        read_exr(tmp_path)

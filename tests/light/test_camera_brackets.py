@@ -1,6 +1,8 @@
 """A photographer's bracket: a known camera is recovered, a public set agrees with its reference."""
 
 import json
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +93,31 @@ def test_times_are_read(text, times):
     assert parse_times(text) == pytest.approx(times)
 
 
-@pytest.mark.parametrize("text", ["", "1/0", "-1", "fast", "1/30,,1/60", "1e9", "nan"])
+@pytest.mark.parametrize(
+    "text", ["", "1/0", "-1", "fast", "1/30,,1/60", "1e9", "nan", "1e400", "1e-999999999"]
+)
 def test_bad_times_are_one_sentence(text):
     with pytest.raises(InputError, match="exposure time"):
         parse_times(text)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (9, 40), (12, 1300)])
+def test_photos_too_small_for_the_response_are_refused(tmp_path, size):
+    paths = [tmp_path / "a.png", tmp_path / "b.png"]
+    for path, value in zip(paths, (40, 80), strict=True):
+        Image.new("RGB", size, (value, value, value)).save(path)
+    with pytest.raises(InputError, match=rf"a\.png is {size[0]}x{size[1]}; a bracket needs"):
+        merge_photos(paths, [0.1, 0.2])
+
+
+def test_a_header_that_claims_too_much_is_damage(tmp_path):
+    path = save_bracket(tmp_path, TIMES)[0]
+    data = bytearray(path.read_bytes())
+    header = b"IHDR" + struct.pack(">II", 60_000, 60_000) + data[24:29]
+    data[12:33] = header + struct.pack(">I", zlib.crc32(header))
+    path.write_bytes(data)
+    with pytest.raises(FormatError, match=r"0\.png is not a readable picture: .* exceeds limit"):
+        exif_exposure(path)
 
 
 def test_what_cannot_be_merged_is_said(tmp_path):

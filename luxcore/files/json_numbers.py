@@ -1,0 +1,44 @@
+"""Numbers out of JSON, which may hold NaN, Infinity, 1e999 or a word where a number is due."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+LARGEST = 1e12
+"""What is larger is no measure of a room; products of such numbers must fit float32."""
+
+
+def finite(value: Any, name: str) -> float:
+    """`value` as a float. Raises ValueError naming `name` unless it is finite and below 1e12."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not abs(number) < LARGEST:
+        raise ValueError(f"{name} is {value!r:.40}, no usable number")
+    return number
+
+
+def positive(value: Any, name: str) -> float:
+    """The same above zero."""
+    number = finite(value, name)
+    if number <= 0:
+        raise ValueError(f"{name} is {number:g}, it must be above 0")
+    return number
+
+
+def whole(value: Any, name: str) -> int:
+    """A whole number, 0 or more."""
+    number = finite(value, name)
+    if number < 0 or number != int(number):
+        raise ValueError(f"{name} is {value!r:.40}, no whole number from 0 on")
+    return int(number)
+
+
+def three(values: Any, name: str) -> tuple[float, float, float]:
+    """Three finite numbers, such as a place or a colour."""
+    if not isinstance(values, list | tuple) or len(values) != 3:
+        raise ValueError(f"{name} is {values!r:.40}, not three numbers")
+    x, y, z = (finite(value, name) for value in values)
+    return x, y, z
