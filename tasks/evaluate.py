@@ -24,7 +24,8 @@ def run(stage: StageContext) -> None:
         mv_weights=stage.input("train_mv") / "model.safetensors",
         seed=stage.seed,
     )
-    metrics |= evaluate_scenes(_scenes(stage), stage.out, stage.params.splat.holdout_every)
+    holdouts = (stage.params.splat.holdout_every, stage.params.relight.holdout_every)
+    metrics |= evaluate_scenes(_scenes(stage), stage.out, holdouts)
     stage.log_metrics(metrics)
     write_json(stage.out / "metrics.json", metrics)
     for picture in sorted((stage.out / "pictures").glob("*.png")):

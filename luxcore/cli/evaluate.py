@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from luxcore.errors import InputError
 from luxcore.files.input import check_input_file
@@ -29,7 +30,7 @@ from luxcore.files.input import check_input_file
     default=112,
     show_default=True,
     type=click.IntRange(1),
-    help="(room, lamp) cases with the lamp on, and again off.",
+    help="(panorama, lamp) cases with the lamp on, and again off.",
 )
 @click.option(
     "--groups",
@@ -49,7 +50,7 @@ from luxcore.files.input import check_input_file
     "--public-cases",
     default=None,
     type=click.Path(path_type=Path),
-    help="paper_eval_cases.json of the public dataset: score the paper's own cases.",
+    help="paper_eval_cases.json of the public dataset: score the paper's own cases, all of them.",
 )
 @click.option(
     "--public-cameras",
@@ -59,9 +60,25 @@ from luxcore.files.input import check_input_file
 )
 @click.option("--backend", default="small", show_default=True, help="Single-view model.")
 @click.option("--mv-backend", default="small", show_default=True, help="Multi-view model.")
-@click.option("--sv-weights", default=None, type=click.Path(path_type=Path))
-@click.option("--mv-weights", default=None, type=click.Path(path_type=Path))
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option(
+    "--sv-weights",
+    default=None,
+    type=click.Path(path_type=Path),
+    help="Of the single-view model: a file, or for the paper's a folder or a hub id.",
+)
+@click.option(
+    "--mv-weights",
+    default=None,
+    type=click.Path(path_type=Path),
+    help="Of the multi-view model, likewise.",
+)
+@click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Of the photos that are cut from DATASET, and of models that sample.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
 def command(
     dataset: Path,
@@ -92,7 +109,9 @@ def command(
     )
     weights = {"sv_weights": sv_weights, "mv_weights": mv_weights}
     if public_cases is not None and public_cameras is not None:
-        metrics = evaluate_public(dataset, public_cases, public_cameras, out, settings, **weights)
+        metrics = evaluate_public(
+            dataset, public_cases, public_cameras, out, settings, seed=seed, **weights
+        )
     else:
         views = evaluation_views(dataset)
         metrics = evaluate_models(views, [], out, settings, seed=seed, **weights)
@@ -110,6 +129,10 @@ def _check_given(dataset: Path, public_cases: Path | None, public_cameras: Path 
     """What can be said before the models' libraries are loaded, which takes seconds."""
     if (public_cases is None) != (public_cameras is None):
         raise InputError("--public-cases and --public-cameras go together.")
+    source = click.get_current_context().get_parameter_source
+    for name in ("cases", "groups"):
+        if public_cases is not None and source(name) is not ParameterSource.DEFAULT:
+            raise InputError(f"--{name} does not go with --public-cases, a list of its own.")
     if not dataset.exists():
         raise InputError(f"{dataset} does not exist.")
     for path in (public_cases, public_cameras):

@@ -1,6 +1,6 @@
 """What a lamp's light would be by simple means; each is a floor that a model must clear.
 
-All return linear light up to scale; the channel-wise rescale of the metrics does the rest.
+All return linear radiance, whose scale a method without a model can only take from the photo.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.evaluate.cases import LampCase, photo_of
+from luxcore.evaluate.cases import LampCase, radiance_of
 
 Baseline = Callable[[LampCase], Float[np.ndarray, "h w 3"]]
 
 
 def copy_input(case: LampCase) -> Float[np.ndarray, "h w 3"]:
     """The photo itself."""
-    return photo_of(case.crop)
+    return radiance_of(case.crop)
 
 
 def flat_colour(case: LampCase) -> Float[np.ndarray, "h w 3"]:
-    """One colour everywhere: the rescale makes it the best one."""
-    return np.ones_like(case.truth)
+    """One colour everywhere, the photo's mean: the rescale makes it the best one."""
+    return np.broadcast_to(radiance_of(case.crop).mean((0, 1)), case.truth.shape)
 
 
 def mask_falloff(case: LampCase) -> Float[np.ndarray, "h w 3"]:
@@ -31,7 +31,7 @@ def mask_falloff(case: LampCase) -> Float[np.ndarray, "h w 3"]:
     rows, columns = np.mgrid[: mask.shape[0], : mask.shape[1]]
     y, x = rows[mask].mean(), columns[mask].mean()
     squared = ((rows - y) ** 2 + (columns - x) ** 2) / (0.2 * max(mask.shape)) ** 2
-    return (photo_of(case.crop) / (1 + squared[..., None])).astype(np.float32)
+    return (radiance_of(case.crop) / (1 + squared[..., None])).astype(np.float32)
 
 
 def lambert(case: LampCase) -> Float[np.ndarray, "h w 3"]:
@@ -42,7 +42,7 @@ def lambert(case: LampCase) -> Float[np.ndarray, "h w 3"]:
     distance = np.maximum(np.linalg.norm(offset, axis=2), 0.1)
     cosine = np.maximum((offset * crop.normal).sum(2) / distance, 0)
     falloff = np.where(mask, 1 / 0.1, cosine / distance**2)
-    return (photo_of(crop) * falloff[..., None]).astype(np.float32)
+    return (radiance_of(crop) * falloff[..., None]).astype(np.float32)
 
 
 BASELINES: dict[str, Baseline] = {

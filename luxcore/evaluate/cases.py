@@ -36,10 +36,10 @@ class LampCase:
 def single_cases(
     views: Sequence[AnyView], size_px: int, seed: int, *, on: bool, limit: int
 ) -> list[LampCase]:
-    """One photo for each (room, lamp) of `views` that can be seen, the lamp on or off in it.
+    """One photo for each (panorama, lamp) of `views` that can be seen, the lamp on or off in it.
 
     The other lamps are as rendered. With the lamp off, the photo keeps the exposure that it has
-    with the lamp on: a camera on a tripod. At most `limit` cases, in the order of the rooms.
+    with the lamp on: a camera on a tripod. At most `limit` cases, in the order of the panoramas.
     """
     store = ViewStore(views)
     cases: list[LampCase] = []
@@ -62,6 +62,11 @@ def photo_of(crop: LitCrop) -> Float[np.ndarray, "h w 3"]:
     """What an 8-bit AgX photo tells of the crop's light, in units where the exposure is 1."""
     shown = np.asarray(agx(crop.image_linear * np.float32(crop.exposure)))
     return np.asarray(agx_inverse(np.round(shown * 255) / 255), np.float32)
+
+
+def radiance_of(crop: LitCrop) -> Float[np.ndarray, "h w 3"]:
+    """The same as linear radiance, as lamps' own lights are: `photo_of` without the exposure."""
+    return photo_of(crop) / np.float32(crop.exposure)
 
 
 def view_of(crop: LitCrop, *, geometry: bool) -> View:

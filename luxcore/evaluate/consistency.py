@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from luxcore.data.crops import LitCrop
 from luxcore.light.agx import agx
+from luxcore.metrics.image import psnr
 from luxcore.models.small.multiview import correspondence
 from luxcore.models.small.samples import chw
 from luxcore.models.small.surfaces import surfaces_of
@@ -35,9 +36,8 @@ def consistency_db(source: LitCrop, target: LitCrop, lamps: Sequence[int]) -> li
     exposure = np.float32(target.exposure)
     values = []
     for k in lamps:
-        difference = agx(moved[k] * exposure) - agx(target.lights[k] * exposure)
-        error = float(np.mean(difference[visible] ** 2, dtype=np.float64))
-        values.append(float(min(99.0, -10 * np.log10(max(error, 1e-10)))))
+        shown = (agx(light * exposure)[visible] for light in (moved[k], target.lights[k]))
+        values.append(psnr(*shown))
     return values
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from luxcore.data.crops import LitCrop
 from luxcore.decompose.photo import decompose_photo
-from luxcore.evaluate.cases import photo_of, view_of
+from luxcore.evaluate.cases import radiance_of, view_of
 from luxcore.evaluate.consistency import consistency_db, warped
 from luxcore.evaluate.table import Row, mean_row
 from luxcore.metrics.score import score_pair
@@ -22,12 +22,13 @@ Lights = Float[np.ndarray, "k h w 3"]
 
 @dataclass(frozen=True)
 class MultiModels:
-    """What is compared. `harmonizer_unwarped` is the same model without warped light, where the
-    backend can do without."""
+    """What is compared, and the seed for models that sample. `harmonizer_unwarped` is the same
+    model without warped light, where the backend can do without."""
 
     decomposer: Decomposer
     harmonizer: Harmonizer
     harmonizer_unwarped: Harmonizer | None
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -62,16 +63,16 @@ def multi_table(groups: Sequence[Sequence[LitCrop]], models: MultiModels) -> Mul
 
 def _methods(models: MultiModels) -> dict[tuple[str, str], Callable]:
     def single(group: Sequence[LitCrop]) -> list[Lights]:
-        return [_single(crop, models.decomposer) for crop in group[1:]]
+        return [_single(crop, models.decomposer, models.seed) for crop in group[1:]]
 
     def harmonized(harmonizer: Harmonizer, reference: Callable) -> Callable:
-        return lambda group: _harmonized(group, harmonizer, reference(group[0]))
+        return lambda group: _harmonized(group, harmonizer, reference(group[0]), models.seed)
 
     def warp(group: Sequence[LitCrop]) -> list[Lights]:
         return [warped(group[0], group[0].lights, crop) for crop in group[1:]]
 
     def predicted(crop: LitCrop) -> Reference:
-        return _predicted_reference(crop, models.decomposer)
+        return _predicted_reference(crop, models.decomposer, models.seed)
 
     methods = {
         ("SV per view", "no reference"): single,
@@ -85,20 +86,25 @@ def _methods(models: MultiModels) -> dict[tuple[str, str], Callable]:
     return methods
 
 
-def _single(crop: LitCrop, decomposer: Decomposer) -> Lights:
-    view, exposure = view_of(crop, geometry=True), crop.exposure
-    radiance = photo_of(crop) / np.float32(exposure)
+def _single(crop: LitCrop, decomposer: Decomposer, seed: int) -> Lights:
+    view = view_of(crop, geometry=True)
     result = decompose_photo(
-        radiance, view.masks, decomposer, on=view.on, geometry=view.geometry, exposure=exposure
+        radiance_of(crop),
+        view.masks,
+        decomposer,
+        on=view.on,
+        geometry=view.geometry,
+        exposure=crop.exposure,
+        seed=seed,
     )
     return result.light.contributions()
 
 
 def _harmonized(
-    group: Sequence[LitCrop], harmonizer: Harmonizer, reference: Reference
+    group: Sequence[LitCrop], harmonizer: Harmonizer, reference: Reference, seed: int
 ) -> list[Lights]:
     views = [view_of(crop, geometry=True) for crop in group[1:]]
-    lights = harmonizer.run_pass(views, [reference], 0)
+    lights = harmonizer.run_pass(views, [reference], seed)
     pairs = zip(lights, group[1:], strict=True)
     return [light.contributions() / np.float32(crop.exposure) for light, crop in pairs]
 
@@ -110,9 +116,9 @@ def _true(crop: LitCrop) -> Reference:
     return Reference(view_of(crop, geometry=True), light, crop.masks.any((1, 2)))
 
 
-def _predicted_reference(crop: LitCrop, decomposer: Decomposer) -> Reference:
+def _predicted_reference(crop: LitCrop, decomposer: Decomposer, seed: int) -> Reference:
     view = view_of(crop, geometry=True)
-    light = decomposer.decompose(view.image_linear, view.masks, view.on, view.geometry, 0)
+    light = decomposer.decompose(view.image_linear, view.masks, view.on, view.geometry, seed)
     return Reference(view, light, view.masks.any((1, 2)))
 
 

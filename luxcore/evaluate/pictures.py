@@ -17,18 +17,18 @@ MAX_ROWS = 8
 
 
 def comparison_sheet(
-    cases: Sequence[LampCase], decomposer: Decomposer
+    cases: Sequence[LampCase], decomposer: Decomposer, seed: int = 0
 ) -> Float[np.ndarray, "h w 3"]:
     """One row per case: photo, mask, model (photo alone), model (geometry), truth; evenly drawn."""
     step = max(1, len(cases) // MAX_ROWS)
-    return np.concatenate([_row(case, decomposer) for case in cases[::step][:MAX_ROWS]])
+    return np.concatenate([_row(case, decomposer, seed) for case in cases[::step][:MAX_ROWS]])
 
 
-def _row(case: LampCase, decomposer: Decomposer) -> np.ndarray:
+def _row(case: LampCase, decomposer: Decomposer, seed: int) -> np.ndarray:
     exposure = np.float32(case.crop.exposure)
 
     def predicted(geometry: bool) -> np.ndarray:
-        light = lamp_of(decomposed(case, decomposer, geometry=geometry), case.lamp)
+        light = lamp_of(decomposed(case, decomposer, seed, geometry=geometry), case.lamp)
         return agx(light * shown_scale(light, case.truth, case.crop.exposure) * exposure)
 
     mask = np.repeat(case.crop.masks[case.lamp][..., None], 3, axis=2).astype(np.float32)

@@ -32,6 +32,7 @@ def evaluate_public(
     *,
     sv_weights: Path | None = None,
     mv_weights: Path | None = None,
+    seed: int = 0,
 ) -> dict[str, float]:
     """Both tables on the test scenes in `dataset` (shards or folders); writes `out`/tables
     and returns the metrics. Photos are `settings.size_px` a side; the paper's
@@ -40,8 +41,8 @@ def evaluate_public(
     listed, known = read_case_list(case_list), read_cameras(cameras)
     groups = PublicGroups(dataset, listed, known, settings.size_px)
     cases = public_cases(dataset, listed, known, settings.size_px)
-    models = open_models(settings, sv_weights, mv_weights)
-    single = single_table(cases, models.decomposer, "lamp on").rows
+    models = open_models(settings, sv_weights, mv_weights, seed)
+    single = single_table(cases, models.decomposer, "lamp on", seed).rows
     write_table(
         out / "tables", "public_single", "Table 1, public cases", single, PAPER_SINGLE, [NOTE]
     )

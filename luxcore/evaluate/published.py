@@ -50,7 +50,7 @@ def read_published(folder: Path) -> Published:
         raise InputError(f"{folder} must hold input.*, and as many masks as ours/olat_*.exr.")
     photo = read_photo(inputs[0])
     height, width = photo.shape[:2]
-    planes = np.stack([read_mask(mask, (width, height)) for mask in masks])
+    planes = np.stack([read_mask(mask, (height, width)) for mask in masks])
     images = [_resized(read_exr_image(olat)[..., :3], (height, width)) for olat in olats]
     return Published(folder.name, photo, planes, images)
 

@@ -41,7 +41,7 @@ def evaluate_models(
 ) -> dict[str, float]:
     """Both tables on held-out `views` (stems of rendered views) and `captures` (capture folder,
     masks folder); writes tables/ and pictures/ into `out`, returns the metrics."""
-    models = open_models(settings, sv_weights, mv_weights)
+    models = open_models(settings, sv_weights, mv_weights, seed)
     metrics = _evaluate_single(views, models.decomposer, out, settings, seed) if views else {}
     groups = multi_groups(views, captures, settings, seed)
     if groups:
@@ -68,7 +68,7 @@ def multi_groups(
 
 
 def open_models(
-    settings: EvaluateSettings, sv_weights: Path | None, mv_weights: Path | None
+    settings: EvaluateSettings, sv_weights: Path | None, mv_weights: Path | None, seed: int
 ) -> MultiModels:
     """The backends that the settings name, ready to be scored."""
     opening = BackendSettings(
@@ -82,6 +82,7 @@ def open_models(
         open_decomposer(settings.backend, opening),
         open_harmonizer(settings.mv_backend, opening),
         open_harmonizer(settings.mv_backend, unwarped) if can_unwarp else None,
+        seed,
     )
 
 
@@ -98,10 +99,10 @@ def _evaluate_single(
         cases = single_cases(views, settings.size_px, seed, on=on, limit=settings.cases)
         if not cases:
             continue
-        result = single_table(cases, decomposer, label)
+        result = single_table(cases, decomposer, label, seed)
         rows += result.rows
         metrics |= _side_metrics(result, label)
-        sheet = comparison_sheet(cases, decomposer)
+        sheet = comparison_sheet(cases, decomposer, seed)
         write_png(out / "pictures" / f"single_{label.replace(' ', '_')}.png", sheet)
     write_table(out / "tables", "single", "Single-view decomposition", rows, PAPER_SINGLE, [NOTE])
     return metrics | flat_metrics("single", rows)

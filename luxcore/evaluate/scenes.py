@@ -49,17 +49,18 @@ class _Case:
 
 
 def evaluate_scenes(
-    scenes: Sequence[SceneFolders], out: Path, holdout_every: int
+    scenes: Sequence[SceneFolders], out: Path, holdouts: Sequence[int]
 ) -> dict[str, float]:
     """Score every capture that has truth; writes tables/scenes.* and pictures/scene_*.png.
 
-    Cases: each lamp alone, and the mix of the photo, in the views that stage 1 and 2 held out.
+    Cases: each lamp alone, and the mix of the photo, in the views that every stage of the splats
+    held out; `holdouts` are the stages' `holdout_every`.
     Returns flat metrics; empty where no capture has truth.
     """
     scores: dict[tuple[str, str], list[dict]] = {}
     for folders in scenes:
         views: list[list[_Case]] = []
-        for cases in _held_out(folders, holdout_every):
+        for cases in _held_out(folders, holdouts):
             views.append(cases)
             for case in cases:
                 kind = "as photographed" if case.light == "photo" else "one lamp"
@@ -75,15 +76,21 @@ def evaluate_scenes(
     return {k: round(v, 4) for k, v in flat_metrics("scene", rows).items()}
 
 
-def _held_out(folders: SceneFolders, holdout_every: int) -> Iterator[list[_Case]]:
+def _held_out(folders: SceneFolders, holdouts: Sequence[int]) -> Iterator[list[_Case]]:
     capture, masks = load_capture(folders.capture), load_masks(folders.masks)
     if capture.truth is None or any(lamp.truth_light is None for lamp in masks.lamps):
         return
     scene = load_scene(folders.scene)
-    for view in split_views(len(capture.frames), holdout_every).held_out:
+    for view in seen_by_none(len(capture.frames), holdouts):
         camera = capture.frames[view].camera
         crop = true_view(capture, masks, view, max(camera.width, camera.height))
         yield _cases(crop, FixedCamera(scene, camera), folders.fuse / f"{view:04d}.exr")
+
+
+def seen_by_none(count: int, holdouts: Sequence[int]) -> list[int]:
+    """Of `count` views those that no split with one of these `holdout_every` trains on."""
+    held_out = [set(split_views(count, every).held_out) for every in holdouts]
+    return sorted(set.intersection(*held_out))
 
 
 def _cases(crop: LitCrop, camera: FixedCamera, fused_file: Path) -> list[_Case]:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from luxcore.decompose.photo import PhotoLight, decompose_photo
 from luxcore.evaluate.baselines import BASELINES
-from luxcore.evaluate.cases import LampCase, photo_of, view_of
+from luxcore.evaluate.cases import LampCase, radiance_of, view_of
 from luxcore.evaluate.leakage import foreign_energy
 from luxcore.evaluate.table import Row, mean_row
 from luxcore.metrics.score import score_pair
@@ -32,14 +32,14 @@ class SingleResult:
 
 
 def single_table(
-    cases: Sequence[LampCase], decomposer: Decomposer, label: str, *, baselines: bool = True
+    cases: Sequence[LampCase], decomposer: Decomposer, label: str, seed: int = 0
 ) -> SingleResult:
-    """Scores of every method over `cases`. `label` names the cases: "on" or "off"."""
-    methods: dict[str, Predict] = dict(BASELINES) if baselines else {}
+    """Scores of every method over `cases`. `label` names the cases: "lamp on" or "lamp off"."""
+    methods: dict[str, Predict] = dict(BASELINES)
     kept: dict[int, PhotoLight] = {}
 
     def model(case: LampCase, geometry: bool) -> Float[np.ndarray, "h w 3"]:
-        result = decomposed(case, decomposer, geometry=geometry)
+        result = decomposed(case, decomposer, seed, geometry=geometry)
         if not geometry:
             kept[id(case)] = result
         return lamp_of(result, case.lamp)
@@ -47,7 +47,7 @@ def single_table(
     methods[f"{decomposer.name}, photo alone"] = lambda case: model(case, False)
     methods[f"{decomposer.name}, geometry given"] = lambda case: model(case, True)
     rows = []
-    with progress(f"single view, lamp {label}", len(methods) * len(cases), "photos") as bar:
+    with progress(f"single view, {label}", len(methods) * len(cases), "photos") as bar:
         for name, predict in methods.items():
             scores = []
             for case in cases:
@@ -63,17 +63,19 @@ def single_table(
     )
 
 
-def decomposed(case: LampCase, decomposer: Decomposer, *, geometry: bool) -> PhotoLight:
-    """The model's decomposition of a case, in radiance."""
+def decomposed(
+    case: LampCase, decomposer: Decomposer, seed: int = 0, *, geometry: bool
+) -> PhotoLight:
+    """The model's decomposition of a case, in radiance; `seed` is for models that sample."""
     view = view_of(case.crop, geometry=geometry)
-    exposure = case.crop.exposure
     return decompose_photo(
-        photo_of(case.crop) / np.float32(exposure),
+        radiance_of(case.crop),
         view.masks,
         decomposer,
         on=view.on,
         geometry=view.geometry,
-        exposure=exposure,
+        exposure=case.crop.exposure,
+        seed=seed,
     )
 
 

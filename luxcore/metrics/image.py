@@ -11,7 +11,7 @@ PSNR_CAP_DB = 100.0
 Image = Float[np.ndarray, "h w 3"]
 
 
-def psnr(predicted: Image, truth: Image) -> float:
+def psnr(predicted: Float[np.ndarray, "*places c"], truth: Float[np.ndarray, "*places c"]) -> float:
     """Peak signal to noise ratio in dB for a peak of 1; at most 100."""
     error = np.asarray(predicted, np.float64) - np.asarray(truth, np.float64)
     mean_square = float(np.mean(error**2))

@@ -13,7 +13,7 @@ class EvaluateSettings(Settings):
     backend: str = Field("small", description="single-view backend that is scored")
     mv_backend: str = Field("small", description="multi-view backend that is scored")
     cases: int = Field(
-        6, ge=1, le=10_000, description="(room, lamp) cases with the lamp on, and again off"
+        6, ge=1, le=10_000, description="(panorama, lamp) cases with the lamp on, and again off"
     )
     size_px: int = Field(128, ge=32, le=1024, description="side of a case's photo")
     groups: int = Field(

@@ -74,6 +74,7 @@ def test_help_names_every_command():
         (["run", "rendr"], "did you mean render?"),
         (["schedule"], "--cron"),
         (["remix", "no-such-folder", "--out", "x"], "no-such-folder"),
+        (["relight", "ü \n灯", "--out", "x.png"], "ü  灯/scene.json does not exist"),
         (["relight", "scene", "--ev", "nan", "--out", "x.png"], "'nan' is not a finite number"),
         (["relight", "scene", "--ev", "33", "--out", "x.png"], "range"),
         (["render", "--rooms", "1", "--unit-m", "inf", "--out", "x"], "'inf' is not a finite"),
@@ -139,6 +140,11 @@ def test_a_photo_that_cannot_be_used_is_refused_before_models_are_loaded(tmp_pat
         (
             ["evaluate", "--dataset", "folder", "--public-cases", "c", "--public-cameras", "d"],
             "c does not exist",
+        ),
+        (
+            ["evaluate", "--dataset", "folder", "--cases", "9", "--public-cases", "c"]
+            + ["--public-cameras", "d"],
+            "--cases does not go with --public-cases",
         ),
         (["decompose", "folder", "--out", "x"], "folder is a folder, not a file"),
     ],

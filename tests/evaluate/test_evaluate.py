@@ -18,8 +18,10 @@ from luxcore.evaluate.consistency import consistency_db, warped
 from luxcore.evaluate.dataset import evaluation_views
 from luxcore.evaluate.leakage import foreign_energy
 from luxcore.evaluate.run import evaluate_models
+from luxcore.evaluate.scenes import seen_by_none
 from luxcore.evaluate.single import single_table
 from luxcore.evaluate.table import Row, flat_metrics, mean_row, write_table
+from luxcore.metrics.score import score_pair
 from luxcore.models.interface import Decomposition
 from luxcore.settings.evaluate import EvaluateSettings
 from tests.models.sketched import sketched_crops, write_sketched_capture, write_tiny_weights
@@ -57,6 +59,45 @@ def test_the_truth_scores_near_perfect_and_beats_every_baseline(crops: list[LitC
     best = max(scores[name] for name in BASELINES)
     assert scores["oracle, photo alone"] > max(best + 6, 40)
     assert result.recomposition_db > 35
+
+
+@pytest.mark.parametrize("exposure", [0.3, 4.0])
+def test_copying_a_photo_of_one_light_is_that_light_unscaled_too(
+    crops: list[LitCrop], exposure: float
+) -> None:
+    asked = case(crops[0])
+    # Within what an 8-bit picture shows at either exposure.
+    lights = np.clip(asked.crop.lights, 0.05, 2.0)
+    alone = np.arange(len(lights)) == asked.lamp
+    dark = np.zeros_like(asked.crop.ambient)
+    crop = replace(asked.crop, lights=lights, on=alone, ambient=dark, exposure=exposure)
+    lit = replace(asked, crop=crop)
+    score = score_pair(BASELINES["copy the input"](lit), lit.truth, exposure)
+    assert min(score["psnr"], score["psnr_picture"], score["psnr_unscaled"]) > 45
+
+
+class Noted(Oracle):
+    """Remembers the seeds that it was given."""
+
+    def __init__(self, crop: LitCrop) -> None:
+        super().__init__(crop)
+        self.seeds: list[int] = []
+
+    def decompose(self, image_linear, masks, on, geometry, seed):  # type: ignore[no-untyped-def]
+        self.seeds.append(seed)
+        return super().decompose(image_linear, masks, on, geometry, seed)
+
+
+def test_models_that_sample_are_given_the_seed(crops: list[LitCrop]) -> None:
+    noted = Noted(crops[0])
+    single_table([case(crops[0])], noted, "lamp on", 7)
+    assert noted.seeds == [7, 7]
+
+
+def test_views_that_a_stage_was_trained_on_are_not_scored() -> None:
+    assert seen_by_none(12, (4, 4)) == [3, 7, 11]
+    assert seen_by_none(12, (4, 3)) == [11]
+    assert seen_by_none(12, (4, 24)) == []
 
 
 def test_a_photo_of_a_case_is_clipped_and_rounded(crops: list[LitCrop]) -> None:

@@ -17,19 +17,19 @@ from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
 from luxcore.models.interface import Decomposition
 
-SIZE = 48
+HEIGHT, WIDTH = 48, 64
 
 
 def lamp_light(x: float) -> np.ndarray:
     """A round lamp at column x of a grey room."""
-    rows, columns = np.mgrid[:SIZE, :SIZE] / SIZE
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH] / WIDTH
     squared = (columns - x) ** 2 + (rows - 0.3) ** 2
     light = np.where(squared < 0.004, 40.0, 0.01 / (squared + 0.02))
     return np.repeat(light[..., None], 3, 2).astype(np.float32)
 
 
 LAMPS = np.stack([lamp_light(0.25), lamp_light(0.75)])
-AMBIENT = np.full((SIZE, SIZE, 3), 0.05, np.float32)
+AMBIENT = np.full((HEIGHT, WIDTH, 3), 0.05, np.float32)
 
 
 @dataclass(frozen=True)
