@@ -142,8 +142,7 @@ def test_a_photo_that_cannot_be_used_is_refused_before_models_are_loaded(tmp_pat
             "c does not exist",
         ),
         (
-            ["evaluate", "--dataset", "folder", "--cases", "9", "--public-cases", "c"]
-            + ["--public-cameras", "d"],
+            "evaluate --dataset folder --cases 9 --public-cases c --public-cameras d".split(),
             "--cases does not go with --public-cases",
         ),
         (["decompose", "folder", "--out", "x"], "folder is a folder, not a file"),
