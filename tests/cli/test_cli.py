@@ -142,7 +142,17 @@ def test_a_photo_that_cannot_be_used_is_refused_before_models_are_loaded(tmp_pat
             "c does not exist",
         ),
         (
-            "evaluate --dataset folder --cases 9 --public-cases c --public-cameras d".split(),
+            [
+                "evaluate",
+                "--dataset",
+                "folder",
+                "--cases",
+                "9",
+                "--public-cases",
+                "c",
+                "--public-cameras",
+                "d",
+            ],
             "--cases does not go with --public-cases",
         ),
         (["decompose", "folder", "--out", "x"], "folder is a folder, not a file"),
