@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from luxcore.errors import InputError
-
-LARGEST = 1e12
-"""Of a camera's numbers: their products must fit float32, which the kernels calculate in."""
+from luxcore.files.json_numbers import LARGEST
 
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -103,7 +101,8 @@ def camera_from_nerfstudio(
         c2w = np.vstack([c2w, [0, 0, 0, 1]])
     if c2w.shape != (4, 4):
         raise InputError(f"camera transform_matrix must be 4x4, got shape {c2w.shape}.")
-    return Camera(fx, fy, cx, cy, width, height, c2w @ OPENGL_FROM_OPENCV)
+    # Not as a product of matrices, which would make NaN of the infinities that are reported.
+    return Camera(fx, fy, cx, cy, width, height, c2w * OPENGL_FROM_OPENCV.diagonal())
 
 
 def camera_to_nerfstudio(camera: Camera) -> dict[str, Any]:
@@ -125,9 +124,19 @@ def _camera_problem(camera: Camera) -> str | None:
     numbers = (camera.fx, camera.fy, camera.cx, camera.cy)
     if not all(abs(v) < LARGEST for v in numbers) or min(camera.fx, camera.fy) <= 0:
         return f"intrinsics must be finite with a positive focal length, got {numbers}"
-    if camera.c2w.shape != (4, 4) or not (np.abs(camera.c2w) < LARGEST).all():
+    return pose_problem(camera.c2w)
+
+
+def pose_problem(c2w: np.ndarray) -> str | None:
+    """What makes a matrix no camera-to-world pose, to follow the word "camera"; None: it is one."""
+    if c2w.shape != (4, 4) or not (np.abs(c2w) < LARGEST).all():
         return "c2w must be a finite 4x4 matrix"
-    rotation = camera.c2w[:3, :3]
+    if not np.allclose(c2w[3], (0, 0, 0, 1), atol=1e-6):
+        return f"c2w must end in the row 0 0 0 1, got {c2w[3].tolist()}"
+    rotation = c2w[:3, :3]
+    # Loose, since some files round to four digits.
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3):
         return "c2w must hold a rotation, its first three columns are not orthonormal"
+    if np.linalg.det(rotation) < 0:
+        return "c2w must hold a rotation, it mirrors the world instead"
     return None

@@ -1,5 +1,9 @@
 """The exceptions a user may see. Each message is one sentence naming the thing and the fact."""
 
+from __future__ import annotations
+
+import errno
+
 
 class LuxError(Exception):
     """A failure that one sentence explains; `lux` prints it and exits with `exit_code`."""
@@ -27,3 +31,15 @@ class BusyError(LuxError):
 
 class DivergedError(LuxError):
     """An optimization or a model produced numbers that are not finite."""
+
+
+def system_sentence(error: OSError) -> str | None:
+    """A failure of the operating system as one sentence; None where it names no file and no disk.
+
+    A full disk is met in the middle of writing, where the system no longer knows the file's name.
+    """
+    if error.filename is not None:
+        return f"{error.filename}: {error.strerror}."
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"{error.strerror}: make room and start again."
+    return None

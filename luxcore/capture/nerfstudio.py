@@ -11,8 +11,10 @@ from luxcore.capture.names import inside
 from luxcore.capture.points import Points, read_points
 from luxcore.capture.posed import PosedPhoto
 from luxcore.capture.sparse import Lens
-from luxcore.capture.store import checked_camera, frame_records, read_object
+from luxcore.capture.store import checked_camera, frame_records
 from luxcore.errors import FormatError
+from luxcore.files.json_numbers import finite
+from luxcore.files.json_object import read_object
 
 _MODELS = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE"}
 _SUFFIXES = ("", ".png", ".jpg", ".jpeg")
@@ -28,7 +30,7 @@ def read_nerfstudio(path: Path) -> tuple[list[PosedPhoto], Points]:
     if len(records) < 2:
         raise FormatError(f"{path} holds {len(records)} frame; at least two are needed.")
     model = transforms.get("camera_model", "OPENCV")
-    if model not in _MODELS:
+    if not isinstance(model, str) or model not in _MODELS:
         raise FormatError(f"{path} has camera_model {model!r:.40}; known are OPENCV and PINHOLE.")
     photos = [_photo(path, record, transforms) for record in records]
     if np.ptp(np.stack([p.c2w[:3, 3] for p in photos]), axis=0).max() < 1e-9:
@@ -45,11 +47,9 @@ def _photo(path: Path, record: dict[str, Any], transforms: dict[str, Any]) -> Po
         raise FormatError(f"{path} names {name:.80}, which does not exist.")
     merged = {**transforms, **record}
     try:
-        distortion = tuple(float(merged.get(k, 0.0)) for k in ("k1", "k2", "p1", "p2", "k3"))
-    except (TypeError, ValueError) as error:
-        raise FormatError(f"{path}: {name:.80} has distortion that is not a number.") from error
-    if not np.isfinite(distortion).all():
-        raise FormatError(f"{path}: {name:.80} has distortion that is not finite.")
+        distortion = tuple(finite(merged.get(k, 0.0), k) for k in ("k1", "k2", "p1", "p2", "k3"))
+    except ValueError as error:
+        raise FormatError(f"{path}: {name:.80}: {error}.") from error
     size = camera.width, camera.height
     lens = Lens(*size, camera.fx, camera.fy, camera.cx, camera.cy, distortion)
     return PosedPhoto(found[0].name, found[0], lens, camera.c2w)

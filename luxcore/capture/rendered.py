@@ -16,10 +16,11 @@ from jaxtyping import Float
 from luxcore.cameras import Camera
 from luxcore.capture.depth_points import points_from_distance
 from luxcore.capture.points import Points
-from luxcore.capture.store import Capture, View, checked_camera, read_object, write_capture
+from luxcore.capture.store import Capture, View, checked_camera, write_capture
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import read_exr
+from luxcore.files.json_object import read_object
 from luxcore.light.agx import agx
 from luxcore.settings.capture import CaptureSettings
 

@@ -9,7 +9,6 @@ truth/            rendered rooms only: 0000.exr, 0000.geometry.exr, 0000.masks.e
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,8 @@ from luxcore.capture.names import check_id, inside
 from luxcore.capture.points import Points, read_points, write_points
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import atomic_folder, write_json
+from luxcore.files.json_numbers import positive
+from luxcore.files.json_object import read_object
 from luxcore.files.photos import write_png
 
 
@@ -130,25 +131,14 @@ def load_capture(folder: Path) -> Capture:
             frames=frames,
             points=read_points(folder / "points.ply"),
             metric=bool(about["metric"]),
-            exposure=None if about["exposure"] is None else float(about["exposure"]),
+            exposure=_exposure(about["exposure"]),
             source=str(about["source"]),
             skipped=tuple(Skipped(s["name"], s["reason"]) for s in about["skipped"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError) as error:
         raise FormatError(f"{about_path} lacks a usable {error}.") from error
-
-
-def read_object(path: Path) -> dict[str, Any]:
-    """A JSON object from a file; InputError or FormatError when it is not there or not one."""
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"{path} is not readable JSON: {error}.") from error
-    if not isinstance(value, dict):
-        raise FormatError(f"{path} must hold a JSON object.")
-    return value
+    except ValueError as error:
+        raise FormatError(f"{about_path}: {error}.") from error
 
 
 def frame_records(path: Path, transforms: dict[str, Any]) -> list[dict[str, Any]]:
@@ -168,6 +158,10 @@ def checked_camera(path: Path, frame: dict[str, Any], shared: dict[str, Any]) ->
         return camera_from_nerfstudio(frame, shared)
     except InputError as error:
         raise FormatError(f"{path}: {frame['file_path']:.80}: {error}") from error
+
+
+def _exposure(value: Any) -> float | None:
+    return None if value is None else positive(value, "exposure")
 
 
 def _write_view(folder: Path, index: int, view: View) -> dict[str, Any]:

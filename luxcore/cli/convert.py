@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+from luxcore.errors import LuxError
+
+if TYPE_CHECKING:
+    from luxcore.data.convert import Converted
 
 
 @click.command(name="convert")
@@ -34,30 +40,46 @@ def command(
     A folder of views in the compact form becomes scenes of the public layout, one a room. Scenes
     of the public layout (a folder, a shard, a folder of shards) become views in the compact form;
     shards are not unpacked. With --photos, each room becomes a folder of photos cut out of its
-    panoramas, with depth, transforms.json and COLMAP's sparse/0.
+    panoramas, with depth, transforms.json and COLMAP's sparse/0. A room that cannot be read is
+    named and left out whole; the others go on, and the exit code is 1.
     """
-    import shutil
-
     from luxcore.data.compact import holds_compact, list_rendered
     from luxcore.data.convert import compact_to_public, cut_photos, public_to_compact
-    from luxcore.data.public_writer import write_shards
     from luxcore.files.output import check_out_folder
 
     # Scenes and rooms are written whole: one of the same name would be replaced.
     check_out_folder(out)
     if photos is not None:
         size = (photo_size, photo_size)
-        folders = cut_photos(source, out, photos=photos, size=size, seed=seed)
-        click.echo(f"{len(folders)} rooms in {out}")
-        return
-    if not holds_compact(source):
-        stems = public_to_compact(source, out)
-        click.echo(f"{len(stems)} views in {out}")
-        return
-    scenes = compact_to_public(list_rendered(source), out, first_scene=first_scene, seed=seed)
-    if shards is not None:
-        for shard in write_shards(scenes, out, shards):
-            click.echo(f"{shard}")
-        for scene in scenes:
-            shutil.rmtree(scene)
-    click.echo(f"{len(scenes)} scenes in {out}")
+        done = cut_photos(source, out, photos=photos, size=size, seed=seed)
+        _tell(done, "rooms", out)
+    elif holds_compact(source):
+        stems = list_rendered(source)
+        done = compact_to_public(stems, out, first_scene=first_scene, seed=seed)
+        if shards is not None:
+            _pack(done.written, out, shards)
+        _tell(done, "scenes", out)
+    else:
+        _tell(public_to_compact(source, out), "views", out)
+
+
+def _pack(scenes: list[Path], out: Path, split: str) -> None:
+    import shutil
+
+    from luxcore.data.public_writer import write_shards
+
+    for shard in write_shards(scenes, out, split):
+        click.echo(f"{shard}")
+    for scene in scenes:
+        shutil.rmtree(scene)
+
+
+def _tell(done: Converted, what: str, out: Path) -> None:
+    """Raises LuxError when a room was left out."""
+    for room, cause in done.failed.items():
+        click.echo(f"left out {room}: {cause}", err=True)
+    click.echo(f"{len(done.written)} {what} in {out}")
+    if done.failed:
+        first, *others = done.failed
+        rooms = f"{first} and {len(others)} more" if others else first
+        raise LuxError(f"{out} lacks {rooms}, which could not be converted.")

@@ -77,6 +77,8 @@ def command(
     colmap hold photos rendered in the light asked for; of a CAPTURE folder, its own photos.
     """
     _check_options(form, options, lamps, view, out)
+    if out.is_file() and out.samefile(scene / "splats.ply"):
+        raise InputError(f"{out} is a file of the scene itself; name another.")
     if form in LAYOUTS and (scene / "capture.json").is_file():
         if options:
             raise InputError(f"{scene} is a capture, whose photos take no --set.")
@@ -98,6 +100,8 @@ def command(
     elif form == "exr":
         _export_layers(loaded, read_camera(scene / "transforms.json", view or 0), settings, out)
     else:
+        if not loaded.views:
+            raise InputError(f"{scene} has no views to render.")
         cameras = [read_camera(scene / "transforms.json", i) for i in range(loaded.views)]
         _export_relit(loaded, cameras, settings, form, out)
 
@@ -115,7 +119,8 @@ def _check_options(
     suffix = FORMATS[form].suffix
     if lamps or not suffix:
         # A folder of photos looks like one that was exported, so that must be a new one.
-        check_out_folder(out, (f"[0-9][0-9]_*{suffix}",) if lamps else ())
+        names = (f"[0-9][0-9]_*{suffix}",) if lamps else ()
+        check_out_folder(out, names, mark=f"00_ambient{suffix}" if lamps else None)
     elif out.suffix.lower() != suffix:
         raise InputError(f"{out} must end in {suffix}.")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from luxcore.cli.camera_file import read_camera
+from luxcore.cli.float_range import FiniteRange
 from luxcore.cli.image_out import check_out, write_image
 from luxcore.cli.lamp_options import parse_lamp_settings
 from luxcore.errors import InputError
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--camera", type=click.Path(path_type=Path), help="One nerfstudio frame as JSON.")
 @click.option("--view", type=int, help="Instead of --camera: that of this photo, from 0.")
-@click.option("--ev", default=0.0, show_default=True, type=click.FloatRange(-32, 32),
+@click.option("--ev", default=0.0, show_default=True, type=FiniteRange(-32, 32),
               help="Stops brighter, for PNG.")  # fmt: skip
 @click.option("--out", required=True, type=click.Path(path_type=Path), help=".png or .exr (linear)")
 def command(
@@ -39,8 +40,6 @@ def command(
 
     PNG is AgX at the scene's exposure; EXR holds linear radiance.
     """
-    if ev != ev:
-        raise InputError("--ev must be a number of stops, got nan.")
     check_out(out)
     from luxcore.splats.scene_files import check_scene
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from luxcore.cli.float_range import FiniteRange
+
 if TYPE_CHECKING:
     from luxcore.rooms.model import Room
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
               type=click.Path(path_type=Path),
               help="A room from elsewhere: .blend, .gltf, .glb, .usd, .usda, .usdc, .usdz, .obj, "
               "a folder of .obj, or Aria's scene language (.txt). May be repeated.")  # fmt: skip
-@click.option("--unit-m", default=None, type=click.FloatRange(min=0, min_open=True),
+@click.option("--unit-m", default=None, type=FiniteRange(min=0, min_open=True),
               help="Metres in one unit of an imported file; else what the file says.")  # fmt: skip
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 999_999),
               help="Seed and id of the first room; room k has S + k.")  # fmt: skip

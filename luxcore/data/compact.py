@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from luxcore.cameras import Camera, camera_from_nerfstudio, camera_to_nerfstudio
+from luxcore.cameras import Camera, camera_from_nerfstudio, camera_to_nerfstudio, pose_problem
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import read_exr, write_exr
+from luxcore.files.json_numbers import finite, parse_json, positive, three
 
 MASK_KINDS = ("emitter", "fixture", "hull")
 MASKS_FILE = ".masks.exr"
@@ -81,10 +81,11 @@ def load_rendered(path_stem: Path) -> RenderedView:
     _check_sizes(stem, [*images.values(), *geometry.values(), *masks.values()])
     try:
         lamps = tuple(_lamp(entry) for entry in about["lamps"])
+        _check_lamps(len(lamps), images, masks)
         camera = about["camera"]
         perspective = about["kind"] == "perspective"
         pinhole = camera_from_nerfstudio(camera) if perspective else None
-        c2w = pinhole.c2w if pinhole else np.array(camera["transform_matrix"], float)
+        c2w = pinhole.c2w if pinhole else _panorama_pose(camera)
         return RenderedView(
             room=str(about["room"]),
             kind=_kind(about["kind"]),
@@ -98,10 +99,12 @@ def load_rendered(path_stem: Path) -> RenderedView:
             masks={kind: _masks(masks, kind, len(lamps)) for kind in MASK_KINDS},
             window=masks["window"][..., 0] > 0.5,
             lamps=lamps,
-            exposure=float(about["exposure"]),
+            exposure=positive(about["exposure"], "exposure"),
             metadata=about,
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except InputError as error:
+        raise FormatError(f"{stem}.json: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(f"{stem}.json and its EXR files do not agree: {error}.") from error
 
 
@@ -131,8 +134,8 @@ def read_metadata(path_stem: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        about = parse_json(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"{path} is not JSON: {error}.") from error
     if not isinstance(about, dict) or about.get("version") != COMPACT_VERSION:
         raise FormatError(f"{path} is not a rendered view of format version {COMPACT_VERSION}.")
@@ -212,20 +215,36 @@ def _is_view(path: Path) -> bool:
 
 
 def _lamp(entry: dict[str, Any]) -> Lamp:
+    name = str(entry["name"])
     return Lamp(
-        name=str(entry["name"]),
+        name=name,
         kind=str(entry["kind"]),
-        position=_triple(entry["position"]),
-        power_w=float(entry["power_w"]),
-        color=_triple(entry["color"]),
+        position=three(entry["position"], f"the position of lamp {name}"),
+        power_w=finite(entry["power_w"], f"the power of lamp {name}"),
+        color=three(entry["color"], f"the colour of lamp {name}"),
         on=bool(entry["on"]),
-        scale=_triple(entry["scale"]),
+        scale=three(entry["scale"], f"the scale of lamp {name}"),
     )
 
 
-def _triple(values: Any) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
+def _check_lamps(count: int, *files: dict[str, np.ndarray]) -> None:
+    """More light or masks than lamps: what is left over would be lost without a word."""
+    for layers in files:
+        for name in layers:
+            kind, _, number = name.rpartition("_")
+            if kind in ("light", *MASK_KINDS) and number.isdecimal() and int(number) >= count:
+                raise ValueError(f"layer {name} belongs to no lamp, there are {count}")
+
+
+def _panorama_pose(camera: dict[str, Any]) -> np.ndarray:
+    try:
+        c2w = np.array(camera["transform_matrix"], float)
+    except OverflowError as error:
+        raise ValueError("camera c2w must be a finite 4x4 matrix") from error
+    problem = pose_problem(c2w)
+    if problem:
+        raise ValueError(f"camera {problem}")
+    return c2w
 
 
 def _rgb(layer: np.ndarray) -> np.ndarray:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,49 +14,73 @@ from luxcore.cameras import Camera, camera_to_nerfstudio
 from luxcore.data.compact import holds_compact, list_rendered, save_rendered
 from luxcore.data.crops import LitCrop
 from luxcore.data.multiview import MultiViewSets
-from luxcore.data.public_reader import open_scenes, public_views
+from luxcore.data.public_reader import PublicScene, open_scenes, public_views
 from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
 from luxcore.data.rotations import quaternion_from_matrix
 from luxcore.data.store import AnyView, by_room, load_view
-from luxcore.errors import InputError
+from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import atomic_folder, write_json
 from luxcore.files.exr import write_exr
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
 from luxcore.progress import progress
 
+SCENE_DIGITS = 6
+Held = TypeVar("Held")
+_ROOM = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
+"""A room's name comes out of a file: as a folder it must stay below `out`."""
+
+
+@dataclass(frozen=True)
+class Converted:
+    """What was written, and the rooms that were left out, each with the cause.
+
+    A room is converted whole or not at all; one that cannot be read does not stop the others.
+    """
+
+    written: list[Path]
+    failed: dict[str, str]
+
 
 def compact_to_public(
     stems: Sequence[Path], root: Path, *, first_scene: int = 0, seed: int = 0
-) -> list[Path]:
-    """One public scene per room, numbered from `first_scene` in the order of `stems`."""
+) -> Converted:
+    """One public scene per room, numbered from `first_scene` in the order of `stems`.
+
+    A room that is left out leaves its number free. Raises InputError when six digits are too few.
+    """
     rooms = by_room(stems)
-    scenes = []
-    with progress("public layout", len(rooms), "scenes") as bar:
-        for number, members in enumerate(rooms.values(), start=first_scene):
-            views = [load_view(stem) for stem in members]
-            scenes.append(write_scene(root, f"{number:06d}", views, seed=seed))
-            bar.advance()
-    return scenes
+    numbers = {room: f"{number:06d}" for number, room in enumerate(rooms, start=first_scene)}
+    if max(map(len, numbers.values()), default=0) > SCENE_DIGITS:
+        raise InputError(f"{len(rooms)} scenes from {first_scene} on go beyond six digits.")
+
+    def write(room: str, members: Sequence[AnyView]) -> list[Path]:
+        views = [load_view(member) for member in members]
+        return [write_scene(root, numbers[room], views, seed=seed)]
+
+    return _each("public layout", "scenes", rooms, write)
 
 
-def public_to_compact(path: Path, out: Path) -> list[Path]:
-    """Every view of the scenes at `path` (shards or folders) as `out`/SSSSSS_V; returns the stems.
+def public_to_compact(path: Path, out: Path) -> Converted:
+    """Every view of the scenes at `path` (shards or folders) as `out`/SSSSSS_V, by its stem.
 
     The photo is the mix "as taken" where the scene has it, else the full mix.
     """
-    stems = []
-    for scene in open_scenes(path):
+
+    def write(_: str, scene: PublicScene) -> list[Path]:
         mix = AS_TAKEN_PASS if AS_TAKEN_PASS in scene.mix_passes else 0
-        for view in scene.views:
-            stems.append(Path(out) / f"{scene.scene_id}_{view}")
-            save_rendered(scene.read_view(view, mix), stems[-1])
-    return stems
+        views = {view: scene.read_view(view, mix) for view in scene.views}
+        stems = [Path(out) / f"{scene.scene_id}_{view}" for view in views]
+        for view, stem in zip(views.values(), stems, strict=True):
+            save_rendered(view, stem)
+        return stems
+
+    return _each("compact form", "scenes", {s.scene_id: s for s in open_scenes(path)}, write)
 
 
 def cut_photos(
     source: Path, out: Path, *, photos: int, size: tuple[int, int], seed: int = 0
-) -> list[Path]:
+) -> Converted:
     """`photos` overlapping perspective photos of every room of `source` as `out`/ROOM.
 
     `source`: views in either form; `size` is (height, width). See `export_photos`.
@@ -61,14 +88,30 @@ def cut_photos(
     views: Sequence[AnyView] = (
         list_rendered(source) if holds_compact(source) else public_views(source)
     )
-    rooms = by_room(views)
-    folders = []
-    with progress("photos", len(rooms), "rooms") as bar:
-        for room, members in rooms.items():
-            sets = MultiViewSets(members, size, seed, relit=False, mask_kinds=("fixture",))
-            folders.append(export_photos(sets.crops(0, photos), Path(out) / room))
+
+    def write(room: str, members: Sequence[AnyView]) -> list[Path]:
+        if not _ROOM.fullmatch(room):
+            raise InputError(f"{source}: a room called {room!r:.80} cannot be a folder.")
+        sets = MultiViewSets(members, size, seed, relit=False, mask_kinds=("fixture",))
+        return [export_photos(sets.crops(0, photos), Path(out) / room)]
+
+    return _each("photos", "rooms", by_room(views), write)
+
+
+def _each(
+    label: str, unit: str, rooms: Mapping[str, Held], write: Callable[[str, Held], list[Path]]
+) -> Converted:
+    done = Converted([], {})
+    with progress(label, len(rooms), unit) as bar:
+        for room, held in rooms.items():
+            try:
+                done.written.extend(write(room, held))
+            except LuxError as error:
+                done.failed[room] = str(error)
             bar.advance()
-    return folders
+    if not (done.written or done.failed):
+        raise InputError("there are no views to convert.")
+    return done
 
 
 def export_photos(crops: Sequence[LitCrop], out: Path) -> Path:

@@ -11,10 +11,7 @@ from numpy.random import Generator
 
 from luxcore.data.crops import LitCrop
 from luxcore.light.blackbody import blackbody_rgb, jitter_hsv
-from luxcore.light.exposure import estimate_exposure
-
-BRACKETS_EV = (0.0, -2.0, -4.0)
-"""The brightness levels that models are asked for (paper, section 3.2)."""
+from luxcore.light.exposure import BRACKETS_EV, estimate_exposure
 
 _LAMP_KELVIN = (2200.0, 6500.0)
 _POWER_SPREAD = 0.6

@@ -23,8 +23,6 @@ SCENES_PER_SHARD = 10
 
 LAMP_TYPES = {"ceiling": "Ceiling", "floor": "Floor", "table": "Desk", "wall": "Wall"}
 """Our kinds of lamps in the layout's words; it has no wall lamps, readers take any word."""
-OUTSIDE_TYPE = "Non_room"
-"""Lights of other rooms: listed in the metadata, never a pass of their own."""
 
 _COLOUR_TOLERANCE = 0.12
 """Sum over channels, as the public tools match mask colours."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +25,7 @@ from luxcore.data.public_names import (
 from luxcore.data.rotations import matrix_from_quaternion
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr
+from luxcore.files.json_numbers import finite, parse_json, positive, three
 from luxcore.files.photos import read_photo
 from luxcore.light.agx import srgb_decode
 from luxcore.light.exposure import estimate_exposure
@@ -76,7 +76,7 @@ class PublicScene:
             if path.stat().st_size > MAX_META_BYTES:
                 raise FormatError(f"{self._where(name)} is too large for metadata.")
             try:
-                about = json.loads(path.read_text(encoding="utf-8"))
+                about = parse_json(path.read_text(encoding="utf-8"))
             except (ValueError, RecursionError) as error:
                 raise FormatError(f"{self._where(name)} is not JSON: {error}.") from error
         if not isinstance(about, dict):
@@ -109,9 +109,10 @@ class PublicScene:
             raise InputError(f"scene {self.scene_id} has no view {view}, only {self.views}.")
         try:
             return self._read(view, mix)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
             raise FormatError(
-                f"scene {self.scene_id} view {view} does not fit the public layout: {error!r}."
+                f"{self._root}: scene {self.scene_id} view {view} does not fit the public layout: "
+                f"{error!r}."
             ) from error
 
     def _read(self, view: int, mix: int) -> RenderedView:
@@ -129,6 +130,7 @@ class PublicScene:
         fixture |= emitter
         stack = np.stack(lights) if lights else np.zeros((0, *size, 3), np.float32)
         source = about.get("source", {})
+        exposure = source.get("exposure")
         mixed = ambient + np.einsum("mc,mhwc->hwc", _scales(lamps), stack)
         return RenderedView(
             room=str(source.get("room", self.scene_id)),
@@ -149,7 +151,9 @@ class PublicScene:
             },
             window=self.picture(0, view, "window.png")[..., 0] > 0.5,
             lamps=lamps,
-            exposure=float(source.get("exposure") or estimate_exposure(mixed)),
+            exposure=estimate_exposure(mixed)
+            if exposure is None
+            else positive(exposure, "exposure"),
             metadata={"scene": self.scene_id, "view": view, **_kept(about)},
         )
 
@@ -165,14 +169,18 @@ class PublicScene:
     def _pose(self, about: dict[str, Any], view: int) -> Float[np.ndarray, "4 4"]:
         pose = about["camera_pose"][self.views.index(view)]
         c2w = np.eye(4)
-        blender = matrix_from_quaternion(np.array(pose["rotation"], float))
+        w, x, y, z = (finite(value, "the rotation of a camera") for value in pose["rotation"])
+        blender = matrix_from_quaternion(np.array([w, x, y, z]))
         c2w[:3, :3] = blender @ PANORAMA_FROM_BLENDER.T
-        c2w[:3, 3] = np.array(pose["position"], float)
+        c2w[:3, 3] = three(pose["position"], "the position of a camera")
         return c2w
 
+    @property
+    def _root(self) -> Path:
+        return self.files.shard if isinstance(self.files, TarFiles) else self.files.folder
+
     def _where(self, name: str) -> str:
-        root = self.files.shard if isinstance(self.files, TarFiles) else self.files.folder
-        return f"{root}: {self.scene_id}/{name}"
+        return f"{self._root}: {self.scene_id}/{name}"
 
 
 def open_scenes(path: Path) -> list[PublicScene]:
@@ -214,25 +222,25 @@ def _active(meta: dict[str, Any]) -> int:
 def _lamp(olat: dict[str, Any], mix: dict[str, Any]) -> Lamp:
     """A lamp as the OLAT pass has it, with the factor that the mix applies to it."""
     entry = olat["lighting"][_active(olat)]
-    mixed = next(light for light in mix["lighting"] if light["id"] == entry["id"])
+    name, kind = str(entry["id"]), str(entry["type"])
+    mixed = next((light for light in mix["lighting"] if light["id"] == entry["id"]), None)
+    if mixed is None:
+        raise ValueError(f"the mix lists no lamp {name}")
     own, wanted = _emission(entry), _emission(mixed)
     scale = np.divide(wanted, own, out=np.zeros(3), where=own > 0)
-    x, y, z = (float(v) for v in entry["position"])
-    r, g, b = (float(v) for v in mixed["color"])
-    kind = str(entry["type"])
     return Lamp(
-        name=str(entry["id"]),
+        name=name,
         kind=_KINDS.get(kind, kind.lower()),
-        position=(x, y, z),
-        power_w=float(mixed["power"]),
-        color=(r, g, b),
+        position=three(entry["position"], f"the position of lamp {name}"),
+        power_w=finite(mixed["power"], f"the power of lamp {name}"),
+        color=three(mixed["color"], f"the colour of lamp {name}"),
         on=bool((scale > 0).any()),
-        scale=(float(scale[0]), float(scale[1]), float(scale[2])),
+        scale=three(scale.tolist(), f"the scale of lamp {name}"),
     )
 
 
 def _emission(light: dict[str, Any]) -> Float[np.ndarray, " 3"]:
-    return float(light["power"]) * np.array(light["color"], float)
+    return finite(light["power"], "a power") * np.array(three(light["color"], "a colour"))
 
 
 def _scales(lamps: tuple[Lamp, ...]) -> Float[np.ndarray, "m 3"]:

@@ -23,31 +23,39 @@ from luxcore.data.public_names import (
     meta_name,
     paint_masks,
 )
-from luxcore.data.public_reader import PANORAMA_FROM_BLENDER
+from luxcore.data.public_reader import PANORAMA_FROM_BLENDER, open_scenes
 from luxcore.data.rotations import quaternion_from_matrix
 from luxcore.data.training import generator
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_file, atomic_folder, write_json
 from luxcore.files.exr import HALF_MAX, write_exr
+from luxcore.files.output import check_out_folder
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx, srgb_encode
 
 JPEG_QUALITY = 98
+TOOL = "luxremix"
+"""What `source` in the metadata of our scenes says; those of the public dataset say nothing."""
+
 AS_TAKEN_PASS = 1
 """The mix pass that holds the photo as taken; 0 is full power, 2 and 3 are random."""
 
 _RELIGHTING_KEY = 4
+_NUMBER = "[0-9]" * 4
+_SCENE_FILES = (f"{_NUMBER}.meta.json", f"{_NUMBER}.{_NUMBER}.*")
 
 
 def write_scene(root: Path, scene_id: str, views: Sequence[RenderedView], *, seed: int = 0) -> Path:
     """Write all passes of a room's panoramas to `root`/`scene_id`; the folder appears whole.
 
     An OLAT is c_i · light_i, so the full mix is background + Σ OLAT. `seed` draws the powers and
-    colours of mixes 2 and 3. Raises InputError for views of different rooms or no panoramas.
+    colours of mixes 2 and 3. Raises InputError for views of different rooms, no panoramas, or a
+    folder of that name that is not ours.
     """
     _check(scene_id, views)
-    mixes = _mixes(views[0], generator(seed, _RELIGHTING_KEY, int(scene_id)))
     folder = Path(root) / scene_id
+    check_ours(folder)
+    mixes = _mixes(views[0], generator(seed, _RELIGHTING_KEY, int(scene_id)))
     with atomic_folder(folder) as out:
         clipped = 0
         for number, view in enumerate(views, start=1):
@@ -63,6 +71,25 @@ def write_scene(root: Path, scene_id: str, views: Sequence[RenderedView], *, see
             lighting[lamp]["update"] = True
             _write_meta(out, FIRST_OLAT_PASS + lamp, common, lighting)
     return folder
+
+
+def check_ours(path: Path) -> None:
+    """Refuse to replace a scene's folder or a shard that this program did not write.
+
+    Raises InputError naming `path`; one that does not exist or is an empty folder passes.
+    """
+    if path.suffix != ".tar":
+        check_out_folder(path, _SCENE_FILES, mark=meta_name(0))
+        if not (path / meta_name(0)).exists():
+            return
+    elif not path.exists():
+        return
+    try:
+        tools = {scene.meta(0)["source"]["tool"] for scene in open_scenes(path)}
+    except (InputError, KeyError, TypeError):
+        tools = set()
+    if tools != {TOOL}:
+        raise InputError(f"{path} was not written by this program; name a new folder.")
 
 
 def write_shards(scenes: Sequence[Path], out: Path, split: str) -> list[Path]:
@@ -211,7 +238,7 @@ def _common_metadata(scene_id: str, views: Sequence[RenderedView], clipped: int)
             "env_flip": False,
         },
         "source": {
-            "tool": "luxremix",
+            "tool": TOOL,
             "room": views[0].room,
             "exposure": views[0].exposure,
             "clipped_values": clipped,

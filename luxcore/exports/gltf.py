@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_file
 from luxcore.splats.gaussians import Gaussians, color_from_sh
 
@@ -34,7 +35,12 @@ _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
 def write_glb(path: Path, gaussians: Gaussians) -> None:
-    """Write Gaussians of any degree of spherical harmonics, atomically."""
+    """Write Gaussians of any degree of spherical harmonics, atomically.
+
+    Raises InputError where there are none: glTF knows no empty arrays.
+    """
+    if len(gaussians) == 0:
+        raise InputError(f"{path}: glTF cannot hold a scene of 0 Gaussians.")
     attributes = _attributes(gaussians)
     views, accessors, blob = _pack(attributes)
     primitive = {

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from luxcore.imports.scene_file import SceneData, SceneMesh
+from luxcore.light.blackbody import LUMINANCE_709
 from luxcore.rooms.model import LampKind
 
 SAME_FIXTURE_M = 0.35
@@ -21,7 +22,6 @@ SAME_COLOR = 0.98
 NAMED_POWER_W = 25.0
 """For a surface that is called a lamp but does not emit in the file (OBJ cannot say)."""
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _NAME = re.compile(r"lamp|luminaire|lightbulb|bulb|(?<![a-z])light(?![a-z])", re.IGNORECASE)
 
 
@@ -99,7 +99,7 @@ def group_sources(sources: Sequence[Source]) -> list[LampGroup]:
         mine = [g for g in groups if any(_together(source, other) for other in g.sources)]
         merged = LampGroup([s for g in mine for s in g.sources] + [source])
         groups = [g for g in groups if g not in mine] + [merged]
-    return sorted(groups, key=lambda g: -float(g.watts @ LUMINANCE))
+    return sorted(groups, key=lambda g: -float(g.watts @ LUMINANCE_709))
 
 
 def lamp_kind(place: np.ndarray, low: np.ndarray, high: np.ndarray) -> LampKind:

@@ -120,7 +120,7 @@ def _opening(side: Wall, wall: WallLine, window: OpeningLine, floor_z: float) ->
     depth = (wall.thickness or DEFAULT_THICKNESS_M) / 2
     x, y = side.point(_along(side, window), -depth)
     centre = (x, y, round(window.centre[2] - floor_z, 4))
-    return Opening("window", centre, window.width, window.height, side.inward, False)
+    return Opening("window", centre, window.width, window.height, side.inward)
 
 
 def _box(box: BoxLine, floor_z: float, palette: Palette) -> Part:

@@ -6,8 +6,9 @@ Kept: shapes, base colours, roughness, metal and glass, powers and colours of la
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,16 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from luxcore.cameras import OPENGL_FROM_OPENCV, Camera
 from luxcore.errors import InputError
-from luxcore.imports.lamps import (
-    LUMINANCE,
-    LampGroup,
-    Source,
-    find_sources,
-    group_sources,
-    lamp_kind,
-)
+from luxcore.imports.lamps import LampGroup, Source, find_sources, group_sources, lamp_kind
 from luxcore.imports.scene_file import SceneData, SceneMesh
 from luxcore.imports.standpoints import standpoints
+from luxcore.light.blackbody import LUMINANCE_709
 from luxcore.rooms.model import Lamp, Material, MaterialKind, Part, Room, Spot
 from luxcore.rooms.shapes import Ellipsoid, Lathe, Polygons, Shape, Vec3, disc
 
@@ -79,7 +74,7 @@ def scene_to_room(scene: SceneData, unit_m: float | None = None) -> ImportedRoom
         height=float(ceiling[2]),
         materials=materials,
         parts=tuple(parts),
-        lamps=tuple(_lamp(i, g, floor, ceiling, move) for i, g in enumerate(groups)),
+        lamps=_lamps(groups, floor, ceiling, move),
         spots=tuple(spots),
         openings=(),
         environment=None,
@@ -155,7 +150,7 @@ def _emission(mesh: int, slot: int, groups: list[LampGroup]) -> tuple[int | None
 
 
 def _share(source: Source, group: LampGroup) -> float:
-    return float(source.watts @ LUMINANCE) / float(group.watts @ LUMINANCE)
+    return float(source.watts @ LUMINANCE_709) / float(group.watts @ LUMINANCE_709)
 
 
 def _add_material(materials: dict[str, Material], facts: dict[str, Any] | None) -> str:
@@ -209,9 +204,21 @@ def _area_shape(light: dict[str, Any], matrix: np.ndarray, scale: float) -> tupl
     return Polygons(tuple(_vec(c) for c in corners), ((0, 1, 2, 3),)), _vec(turn)
 
 
+def _lamps(
+    groups: Sequence[LampGroup], low: np.ndarray, high: np.ndarray, move: _Move
+) -> tuple[Lamp, ...]:
+    """A lamp per group; those of one name, such as a mesh that shines in two colours, numbered."""
+    lamps = [_lamp(i, g, low, high, move) for i, g in enumerate(groups)]
+    names = Counter(lamp.name for lamp in lamps)
+    return tuple(
+        replace(lamp, name=f"{lamp.name}_{lamp.id}") if names[lamp.name] > 1 else lamp
+        for lamp in lamps
+    )
+
+
 def _lamp(index: int, group: LampGroup, low: np.ndarray, high: np.ndarray, move: _Move) -> Lamp:
     place = group.place + move.shift
-    power = float(group.watts @ LUMINANCE)
+    power = float(group.watts @ LUMINANCE_709)
     kind = lamp_kind(place, low, high)
     # The colour's temperature is not known; 0 stands for a colour that is no black body's.
     name = group.sources[0].name if len(group.sources) == 1 else f"{kind}_{index}"
@@ -226,12 +233,21 @@ def _camera(facts: dict[str, Any], move: _Move) -> Camera:
     wide = fit == "HORIZONTAL" or (fit == "AUTO" and width >= height)
     side = width if wide else height
     focal = 0.5 * side / float(np.tan(facts["angle"] / 2))
-    c2w = np.array(facts["matrix"]) @ OPENGL_FROM_OPENCV
-    c2w[:3, :3] /= np.linalg.norm(c2w[:3, :3], axis=0)
-    c2w[:3, 3] = move.points(c2w[:3, 3])
+    placed = np.array(facts["matrix"])
+    c2w = np.eye(4)
+    c2w[:3, :3] = _unmirrored(placed[:3, :3])
+    c2w[:3, 3] = move.points(placed[:3, 3])
     shift_x, shift_y = facts["shift"]
     cx, cy = width / 2 - shift_x * side, height / 2 + shift_y * side
-    return Camera(focal, focal, cx, cy, width, height, c2w)
+    return Camera(focal, focal, cx, cy, width, height, c2w @ OPENGL_FROM_OPENCV)
+
+
+def _unmirrored(axes: np.ndarray) -> np.ndarray:
+    """[3, 3] rotation that looks as `axes` (OpenGL's) do; a parent may scale, skew or mirror."""
+    back = axes[:, 2] / np.linalg.norm(axes[:, 2])
+    right = np.cross(axes[:, 1], back)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back], axis=1)
 
 
 def _vec(values: Any) -> Vec3:

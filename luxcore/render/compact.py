@@ -10,8 +10,9 @@ from jaxtyping import Float
 
 from luxcore.cameras import Camera
 from luxcore.data import compact
+from luxcore.light.blackbody import LUMINANCE_709
 from luxcore.render.effects import Effects
-from luxcore.render.hdri import LUMINANCE, hdri_path, usable_radiance
+from luxcore.render.hdri import hdri_path, usable_radiance
 from luxcore.render.views import View, view_to_json
 from luxcore.rooms.model import Lamp, Room
 
@@ -74,7 +75,7 @@ def rendered_view(
 
 def photo_exposure(image: Float[np.ndarray, "h w 3"]) -> float:
     """The factor g that brings the log-average luminance of the darker 95 % to KEY_LUMINANCE."""
-    luminance = (image @ LUMINANCE).ravel()
+    luminance = (image @ LUMINANCE_709.astype(np.float32)).ravel()
     kept = np.sort(luminance)[: max(1, int(0.95 * luminance.size))]
     return float(KEY_LUMINANCE / np.exp(np.log(kept + 1e-6).mean()))
 

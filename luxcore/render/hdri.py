@@ -10,8 +10,7 @@ import numpy as np
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import HALF_MAX, read_exr_image
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+from luxcore.light.blackbody import LUMINANCE_709
 
 
 @cache
@@ -39,7 +38,7 @@ def mean_luminance(path: Path) -> float:
 
     Raises FormatError for a file that is no picture and InputError for a black one.
     """
-    luminance = usable_radiance(path)[0] @ LUMINANCE
+    luminance = usable_radiance(path)[0] @ LUMINANCE_709.astype(np.float32)
     height = luminance.shape[0]
     weight = np.cos(np.pi * (0.5 - (np.arange(height) + 0.5) / height))
     mean = float((luminance.mean(axis=1) * weight).sum() / weight.sum())

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from luxcore.data.compact import load_rendered
-from luxcore.data.public_writer import shard_members, write_scene, write_shards
+from luxcore.data.public_writer import check_ours, shard_members, write_scene, write_shards
 from luxcore.errors import InputError, LuxError
 from luxcore.files.atomic import write_json
+from luxcore.files.output import check_out_folder
 from luxcore.render.dataset import Job, check_disk, panorama_jobs, run_jobs
 from luxcore.rooms.model import Room
 from luxcore.settings.render import RenderSettings
@@ -47,12 +48,11 @@ def render_public(
     A view that fails leaves its room with fewer views; a room without views is left out; both are
     named in the result. Work is kept in `out`/work until all is written, so a killed call resumes.
     With `shard_split` ("training", "test") the scenes are packed into tars of ten.
-    Raises InputError for seeds without a six-digit id and LuxError when the disk is too small.
+    Raises InputError for seeds without a six-digit id and for scenes, shards or a folder `work` in
+    `out` that are not ours, and LuxError when the disk is too small.
     """
-    for room in rooms:
-        if not 0 <= room.seed <= LAST_SCENE_ID:
-            raise InputError(f"{room.seed} is no six-digit scene id: use 0 to {LAST_SCENE_ID}.")
     work = out / "work"
+    _check(rooms, out, work, shard_split)
     jobs = {room.id: panorama_jobs([room], settings, room.id) for room in rooms}
     flat = [job for each in jobs.values() for job in each]
     # What the public layout takes comes on top of the units; it is of the same order.
@@ -74,6 +74,18 @@ def render_public(
             shutil.rmtree(scene)
     shutil.rmtree(work)
     return PublicRender(tuple(scenes), sum(len(s.stems) for s in shown.values()), failed)
+
+
+def _check(rooms: Sequence[Room], out: Path, work: Path, shard_split: str | None) -> None:
+    """Everything that would be replaced, before any rendering."""
+    for room in rooms:
+        if not 0 <= room.seed <= LAST_SCENE_ID:
+            raise InputError(f"{room.seed} is no six-digit scene id: use 0 to {LAST_SCENE_ID}.")
+        check_ours(out / room.id)
+    check_out_folder(work, ("units", "views"))
+    if shard_split is not None:
+        for name in shard_members([room.id for room in rooms], shard_split):
+            check_ours(out / f"{name}.tar")
 
 
 @dataclass(frozen=True)

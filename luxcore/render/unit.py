@@ -13,7 +13,12 @@ from luxcore.settings.render import RenderSettings
 NOT_IN_THE_PIXELS = ("timeout_s", "memory_mb")
 """Arguments of a unit that do not belong to its key."""
 
-RENDER_CODE = ("luxcore/render", "luxcore/rooms/model.py", "luxcore/rooms/shapes.py")
+RENDER_CODE = (
+    "luxcore/render",
+    "luxcore/rooms/model.py",
+    "luxcore/rooms/shapes.py",
+    "luxcore/light/blackbody.py",
+)
 """What a rendered view depends on beside its arguments (for the key of its unit)."""
 
 

@@ -13,7 +13,7 @@ from luxcore.errors import FormatError
 from luxcore.rooms import shapes
 from luxcore.rooms.shapes import Shape, Vec2, Vec3
 
-ROOM_VERSION = 1
+ROOM_VERSION = 2
 
 LampKind = Literal["ceiling", "wall", "floor", "table"]
 MaterialKind = Literal[
@@ -116,7 +116,6 @@ class Opening:
     width: float
     height: float
     inward: Vec2
-    glazed: bool
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def build_shell(rng: Rng, plan: FloorPlan, palette: Palette) -> Shell:
                 if hole.kind == "window"
                 else (_door(rng, wall, hole, palette))
             )
-    openings = tuple(_opening(plan.walls[h.wall], h, glazed) for h in holes if h.kind == "window")
+    openings = tuple(_opening(plan.walls[h.wall], h) for h in holes if h.kind == "window")
     return Shell(tuple(parts), openings, holes)
 
 
@@ -88,10 +88,10 @@ def _draw_window(rng: Rng, plan: FloorPlan, number: int) -> Hole:
     return Hole(number, left, width, sill, max(0.5, round(height, 4)), "window")
 
 
-def _opening(wall: Wall, hole: Hole, glazed: bool) -> Opening:
+def _opening(wall: Wall, hole: Hole) -> Opening:
     x, y = wall.point(hole.left + hole.width / 2, -WALL_THICKNESS_M / 2)
     center = (x, y, round(hole.sill + hole.height / 2, 4))
-    return Opening("window", center, hole.width, hole.height, wall.inward, glazed)
+    return Opening("window", center, hole.width, hole.height, wall.inward)
 
 
 def _floor(plan: FloorPlan) -> Part:

@@ -22,7 +22,9 @@ from luxcore.cameras import Camera, camera_to_nerfstudio
 from luxcore.errors import FormatError
 from luxcore.files.atomic import atomic_file, write_json
 from luxcore.files.digests import file_digest
+from luxcore.files.json_numbers import finite, positive, three, whole
 from luxcore.splats.gaussians import Gaussians
+from luxcore.splats.light_views import AMBIENT
 from luxcore.splats.ply import read_ply, write_ply
 from luxcore.splats.scene_files import FILES, VERSION, check_scene
 
@@ -107,18 +109,21 @@ def load_scene(folder: Path) -> Scene:
     radiance = _read_radiance(folder / "lights.safetensors", len(gaussians))
     try:
         lamps = tuple(_lamp(record) for record in about["lamps"])
+        _check_names(lamps)
         scene = Scene(
             name=str(about["name"]),
             gaussians=gaussians,
             radiance=radiance,
             lamps=lamps,
-            ambient_scale=_three(about["ambient_scale"]),
-            tone=SceneTone(**{key: float(value) for key, value in about["tone"].items()}),
-            views=int(about["views"]),
+            ambient_scale=three(about["ambient_scale"], "ambient_scale"),
+            tone=_tone(about["tone"]),
+            views=whole(about["views"], "views"),
             metric=bool(about.get("metric", False)),
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError) as error:
         raise FormatError(f"{folder / 'scene.json'} lacks a usable {error}.") from error
+    except ValueError as error:
+        raise FormatError(f"{folder / 'scene.json'}: {error}.") from error
     if radiance.shape[1] != len(lamps) + 1:
         raise FormatError(
             f"{folder / 'lights.safetensors'} holds {radiance.shape[1]} lights, "
@@ -133,7 +138,8 @@ def _read_radiance(path: Path, count: int) -> Float32[np.ndarray, "n m 3"]:
 
     try:
         radiance = load_file(path)["radiance"]
-    except (SafetensorError, KeyError) as error:
+    except (SafetensorError, KeyError, TypeError, AttributeError) as error:
+        # The last two: numbers of a type that NumPy does not have.
         raise FormatError(f"{path} holds no tensor called radiance: {error}.") from error
     if radiance.dtype != np.float32 or radiance.ndim != 3 or radiance.shape[2] != 3:
         raise FormatError(
@@ -147,11 +153,26 @@ def _read_radiance(path: Path, count: int) -> Float32[np.ndarray, "n m 3"]:
 
 
 def _lamp(record: dict[str, Any]) -> SceneLamp:
+    name = str(record["name"])
     return SceneLamp(
-        int(record["index"]), str(record["name"]), bool(record["on"]), _three(record["scale"])
+        index=whole(record["index"], f"the index of lamp {name}"),
+        name=name,
+        on=bool(record["on"]),
+        scale=three(record["scale"], f"the scale of lamp {name}"),
     )
 
 
-def _three(values: Any) -> tuple[float, float, float]:
-    red, green, blue = (float(value) for value in values)
-    return red, green, blue
+def _check_names(lamps: Sequence[SceneLamp]) -> None:
+    """Lamps are set by their names, beside the ambient light."""
+    names = [AMBIENT, *(lamp.name for lamp in lamps)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"two lights are called {twice!r:.80}")
+
+
+def _tone(record: dict[str, Any]) -> SceneTone:
+    return SceneTone(
+        exposure=positive(record["exposure"], "the tone's exposure"),
+        beta=finite(record["beta"], "the tone's beta"),
+        gamma=positive(record["gamma"], "the tone's gamma"),
+    )

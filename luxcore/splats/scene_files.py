@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.digests import file_digest
+from luxcore.files.json_object import read_object
 
 VERSION = 1
 FILES = ("splats.ply", "lights.safetensors", "transforms.json")
@@ -33,11 +33,8 @@ def check_scene(folder: Path) -> dict[str, Any]:
 def _read_about(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path} does not exist: {path.parent} is not a scene.")
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-        version = about["version"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise FormatError(f"{path} is not a scene description: {error!r}.") from error
+    about = read_object(path)
+    version = about.get("version")
     if version != VERSION:
         raise FormatError(f"{path} is of version {version}, this program reads {VERSION}.")
     return about

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from luxcore.data.compact import MASKS_FILE, RenderedView, read_metadata
+from luxcore.errors import FormatError
 from luxcore.files.exr import HALF_MAX, read_exr
+from luxcore.files.json_numbers import finite, three, whole
 
 Seconds = Mapping[str, float]
 """CPU seconds by step of a render."""
@@ -63,8 +65,11 @@ def facts_of_files(stem: Path, name: str, seconds: Seconds | None = None) -> Vie
     areas = {kind: int((layer[..., 0] > 0.5).sum()) for kind, layer in masks.items()}
     layers = read_exr(stem.with_name(stem.name + ".exr"))
     light = [v for k, v in layers.items() if k.startswith(("ambient", "light_"))]
-    size = masks["window"].shape[:2]
-    return _facts(name, about, about["lamps"], areas, size, _clipped(light), seconds)
+    try:
+        size = masks["window"].shape[:2]
+        return _facts(name, about, about["lamps"], areas, size, _clipped(light), seconds)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FormatError(f"{stem}.json and its EXR files do not agree: {error}.") from error
 
 
 def facts_of_view(view: RenderedView, name: str) -> ViewFacts:
@@ -79,7 +84,10 @@ def facts_of_view(view: RenderedView, name: str) -> ViewFacts:
     lamps = [{**old, **vars(lamp)} for old, lamp in zip(known, view.lamps, strict=True)]
     about = {**view.metadata, "room": view.room}
     clipped = _clipped([view.ambient, *view.lights])
-    return _facts(name, about, lamps, areas, view.window.shape, clipped, None)
+    try:
+        return _facts(name, about, lamps, areas, view.window.shape, clipped, None)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FormatError(f"{name} has metadata that cannot be used: {error}.") from error
 
 
 def _facts(
@@ -92,19 +100,19 @@ def _facts(
     seconds: Seconds | None,
 ) -> ViewFacts:
     # The public layout has its own place for the samples.
-    config = about.get("blender_cfg") or {}
+    samples = about.get("spp", (about.get("blender_cfg") or {}).get("spp"))
     return ViewFacts(
         name=name,
         room=str(about.get("room")),
-        use=about.get("use"),
+        use=_word(about.get("use")),
         size=(int(size[0]), int(size[1])),
-        spp=about.get("spp", config.get("spp")),
+        spp=None if samples is None else whole(samples, "spp"),
         lamps=tuple(_lamp(about, lamp, i, areas) for i, lamp in enumerate(lamps)),
-        ambient_noise=_number(about.get("noise", {}).get("ambient")),
+        ambient_noise=_number(about.get("noise", {}), "ambient"),
         window_px=areas["window"],
         clipped_values=clipped,
-        topped_up=about.get("topped_up"),
-        effects=dict(about.get("effects", {})),
+        topped_up=_word(about.get("topped_up")),
+        effects={name: dict(effect) for name, effect in about.get("effects", {}).items()},
         seconds=seconds,
     )
 
@@ -113,19 +121,18 @@ def _lamp(
     about: Mapping[str, Any], lamp: Mapping[str, Any], index: int, areas: Mapping[str, int]
 ) -> LampFacts:
     key = f"{index:02d}"
-    red, green, blue = (float(c) for c in np.asarray(lamp["color"]))
     return LampFacts(
         name=str(lamp["name"]),
         kind=str(lamp["kind"]),
-        design=lamp.get("design"),
+        design=_word(lamp.get("design")),
         on=bool(lamp["on"]),
-        power_w=float(lamp["power_w"]),
-        color=(red, green, blue),
-        temperature_k=_number(lamp.get("temperature_k")) or None,
+        power_w=finite(lamp["power_w"], "power_w"),
+        color=three(lamp["color"], "color"),
+        temperature_k=_number(lamp, "temperature_k") or None,
         emitter_px=areas[f"emitter_{key}"],
         fixture_px=areas[f"fixture_{key}"],
-        noise=_number(about.get("noise", {}).get(f"light_{key}")),
-        energy_factor=_number(about.get("energy_factors", {}).get(f"light_{key}")),
+        noise=_number(about.get("noise", {}), f"light_{key}"),
+        energy_factor=_number(about.get("energy_factors", {}), f"light_{key}"),
     )
 
 
@@ -133,5 +140,10 @@ def _clipped(light: Sequence[np.ndarray]) -> int:
     return sum(int(np.count_nonzero(np.abs(layer) >= HALF_MAX)) for layer in light)
 
 
-def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
+def _number(values: Mapping[str, Any], name: str) -> float | None:
+    value = values.get(name)
+    return None if value is None else finite(value, name)
+
+
+def _word(value: Any) -> str | None:
+    return None if value is None else str(value)

@@ -88,7 +88,7 @@ def remarks(views: Sequence[ViewFacts]) -> dict[str, list[str]]:
     lamps = [(view, lamp) for view in views for lamp in view.lamps]
     noisy = sorted(((m.noise, v, m) for v, m in lamps if m.noise), key=lambda e: -e[0])
     bent = sorted(
-        ((m.energy_factor, v, m) for v, m in lamps if m.energy_factor),
+        ((m.energy_factor, v, m) for v, m in lamps if m.energy_factor and m.energy_factor > 0),
         key=lambda e: -abs(np.log(e[0])),
     )
     clipped = sorted((v for v in views if v.clipped_values), key=lambda v: -v.clipped_values)

@@ -199,7 +199,10 @@ def test_nerfstudio_distortion_is_removed(tmp_path: Path, box_room, ring_cameras
     ("change", "fact"),
     [
         (lambda t: t.update(camera_model="OPENCV_FISHEYE"), "OPENCV_FISHEYE"),
-        (lambda t: t.update(k1="much"), "not a number"),
+        (lambda t: t.update(camera_model=["OPENCV"]), "has camera_model"),
+        (lambda t: t.update(k1="much"), 'k1 is "much"'),
+        (lambda t: t.update(k1=10**400), "k1 is 1000"),
+        (lambda t: t.update(p2=float("nan")), "p2 is NaN"),
         (lambda t: t["frames"].pop(), "at least two"),
         (lambda t: t["frames"][0].update(file_path="images/none.png"), "does not exist"),
         (lambda t: t["frames"][0].update(w=100), "its camera says 100x180"),

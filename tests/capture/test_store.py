@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from luxcore.cameras import camera_from_nerfstudio, look_at
+from luxcore.cameras import camera_from_nerfstudio, camera_to_nerfstudio, look_at
 from luxcore.capture import Capture, Points, Skipped, View, load_capture, write_capture
 from luxcore.errors import FormatError, InputError
 
@@ -87,6 +87,24 @@ def test_damaged_transforms_are_named(tmp_path: Path, change, fact: str) -> None
         load_capture(tmp_path / "c")
 
 
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    [
+        ({"exposure": float("nan")}, "exposure is NaN"),
+        ({"exposure": 10**400}, "exposure is 1000"),
+        ({"exposure": 0}, "exposure is 0"),
+        ({"id": "../x"}, "1 to 64 characters"),
+        ({"skipped": [1]}, "usable"),
+    ],
+)
+def test_a_damaged_description_is_named(tmp_path: Path, change: dict, fact: str) -> None:
+    _capture(tmp_path / "c")
+    path = tmp_path / "c" / "capture.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(InputError, match=fact):
+        load_capture(tmp_path / "c")
+
+
 @pytest.mark.parametrize("capture_id", ["", "Room", "a b", "../x", "a;rm -rf ~", "x" * 65])
 def test_ids_that_are_no_folder_names_are_refused(tmp_path: Path, capture_id: str) -> None:
     points = Points(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))
@@ -128,3 +146,30 @@ def test_a_camera_beyond_float32_is_refused(change: dict, fact: str) -> None:
     frame = {"fl_x": 50, "w": 64, "h": 48, "transform_matrix": np.eye(4).tolist()}
     with pytest.raises(InputError, match=fact):
         camera_from_nerfstudio(frame | change)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "fact"),
+    [
+        (np.diag([-1.0, 1, 1, 1]), "mirrors"),
+        (np.eye(4)[[1, 0, 2, 3]], "mirrors"),
+        (np.eye(4) + np.eye(4)[[3, 1, 2, 0]], "0 0 0 1"),
+        (np.diag([1.0, 1, 1, 2]), "0 0 0 1"),
+        (np.diag([1.0, 1, 1, 0]), "0 0 0 1"),
+        (np.diag([2.0, 2, 2, 1]), "orthonormal"),
+        (np.eye(4) + 0.1 * np.eye(4, k=1) * [[1], [1], [0], [0]], "orthonormal"),
+    ],
+)
+def test_a_matrix_that_is_no_pose_is_refused(matrix: np.ndarray, fact: str) -> None:
+    frame = {"fl_x": 50, "w": 64, "h": 48, "transform_matrix": matrix.tolist()}
+    with pytest.raises(InputError, match=fact):
+        camera_from_nerfstudio(frame)
+
+
+@pytest.mark.parametrize("rows", [3, 4])
+def test_a_pose_rounded_to_four_digits_is_taken(rows: int) -> None:
+    """As the tools of others write it, with or without the last row."""
+    camera = look_at(np.array([1.0, 2.0, 3.0]), np.array([-0.3, 0.2, 1.0]), 60.0, 64, 48)
+    frame = camera_to_nerfstudio(camera)
+    frame["transform_matrix"] = np.round(frame["transform_matrix"], 4)[:rows].tolist()
+    assert camera_from_nerfstudio(frame).c2w == pytest.approx(camera.c2w, abs=1e-4)

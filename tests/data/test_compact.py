@@ -82,6 +82,46 @@ def test_files_that_do_not_fit_are_refused(tmp_path):
     (tmp_path / "w.json").write_text(json.dumps(about))
     with pytest.raises(FormatError, match="light_03"):
         load_rendered(tmp_path / "w")
-    (tmp_path / "w.json").write_text("[" * 100_000)
-    with pytest.raises(FormatError, match="not JSON"):
-        load_rendered(tmp_path / "w")
+    for text in ("[" * 100_000, '{"version": ' + "1" * 5000 + "}"):
+        (tmp_path / "w.json").write_text(text)
+        with pytest.raises(FormatError, match="not JSON"):
+            load_rendered(tmp_path / "w")
+
+
+@pytest.mark.parametrize(
+    ("damage", "fact"),
+    [
+        (lambda about: about.update(exposure=float("nan")), "exposure is null"),
+        (lambda about: about.update(exposure=0), "exposure is 0"),
+        (lambda about: about["lamps"][0].update(scale=[1, 1, float("inf")]), "scale of lamp"),
+        (lambda about: about["lamps"][0].update(scale=[1, 1, 10**400]), "scale of lamp"),
+        (lambda about: about["lamps"][0].update(scale=2), "scale of lamp"),
+        (lambda about: about["lamps"][1].update(power_w="strong"), "power of lamp"),
+        (lambda about: about["lamps"].pop(), "light_02 belongs to no lamp, there are 2"),
+        (lambda about: about["lamps"].clear(), "light_00 belongs to no lamp, there are 0"),
+        (lambda about: about.update(lamps=["one"]), "do not agree"),
+        (lambda about: about["camera"].update(transform_matrix=[[1]]), "finite 4x4 matrix"),
+        (
+            lambda about: about["camera"].update(transform_matrix=np.diag([1, 1, -1, 1]).tolist()),
+            "mirrors",
+        ),
+        (lambda about: about.update(camera=[]), "do not agree"),
+    ],
+)
+def test_numbers_that_are_none_name_the_file_and_the_fact(tmp_path, damage, fact):
+    save_rendered(panorama(height=16), tmp_path / "v")
+    about = json.loads((tmp_path / "v.json").read_text())
+    damage(about)
+    (tmp_path / "v.json").write_text(json.dumps(about))
+    with pytest.raises(FormatError, match=rf"v\.json.*{fact}"):
+        load_rendered(tmp_path / "v")
+
+
+def test_the_camera_of_a_perspective_view_is_named_with_its_file(tmp_path):
+    camera = look_at(np.array([1.0, 3.0, 1.5]), np.array([5.0, 2.0, 1.2]), 70.0, 32, 24)
+    save_rendered(perspective(camera), tmp_path / "v")
+    about = json.loads((tmp_path / "v.json").read_text())
+    about["camera"]["fl_x"] = 0
+    (tmp_path / "v.json").write_text(json.dumps(about))
+    with pytest.raises(FormatError, match=r"v\.json.*positive focal length"):
+        load_rendered(tmp_path / "v")

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from luxcore.cli.convert import command
 from luxcore.data.compact import as_taken, list_rendered, load_rendered, save_rendered
 from luxcore.data.public_reader import open_scenes
-from luxcore.errors import InputError
+from luxcore.errors import InputError, LuxError
 from luxcore.files.photos import read_photo
 from tests.data.analytic import panorama
 
@@ -85,6 +85,10 @@ def test_a_folder_of_neither_form_is_an_error(tmp_path: Path) -> None:
         convert(tmp_path / "empty", "--out", tmp_path / "out")
     with pytest.raises(InputError, match="does not exist"):
         convert(tmp_path / "nowhere", "--out", tmp_path / "out")
+    (tmp_path / "empty" / "000001").mkdir()
+    for more in ([], ["--photos", "2"]):
+        with pytest.raises(InputError, match="no views"):
+            convert(tmp_path / "empty", "--out", tmp_path / "out", *more)
     assert not (tmp_path / "out").exists()
 
 
@@ -95,3 +99,48 @@ def test_scenes_of_the_same_name_are_not_replaced(tmp_path: Path) -> None:
     call = CliRunner().invoke(command, [str(tmp_path), "--out", str(tmp_path / "out")])
     assert "which would be lost" in str(call.exception)
     assert mine.read_text() == "kept"
+
+
+def test_a_room_that_is_damaged_is_left_out_whole_and_the_others_go_on(
+    views: Path, tmp_path: Path
+) -> None:
+    public = tmp_path / "public"
+    convert(views, "--out", public)
+    (views / "000002.geometry.exr").write_bytes(b"damaged")
+    for number, more in enumerate(([], ["--shards", "test"], ["--photos", "2"])):
+        out = tmp_path / f"out {number}"
+        call = CliRunner().invoke(command, [str(views), "--out", str(out), *more])
+        assert type(call.exception) is LuxError
+        assert "lacks box" in str(call.exception)
+        assert "left out box: " in call.stderr
+        assert "000002.geometry.exr" in call.stderr
+        kept = [["000001"], ["test-0000.tar"], ["other"]][number]
+        assert [p.name for p in out.iterdir()] == kept
+    (public / "000000" / "1000.0003.rgb_bg.exr").write_bytes(b"damaged")
+    out = tmp_path / "compact again"
+    call = CliRunner().invoke(command, [str(public), "--out", str(out)])
+    assert "lacks 000000" in str(call.exception)
+    assert [stem.name for stem in list_rendered(out)] == ["000001_1"]
+    assert len(list(out.iterdir())) == 4
+
+
+def test_scene_numbers_have_six_digits(views: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="beyond six digits"):
+        convert(views, "--out", tmp_path / "out", "--first-scene", "999999")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("room", ["../victim", "", "..", "a/b", "nul\0", "x" * 300])
+def test_the_name_of_a_room_never_leads_out_of_the_folder(
+    views: Path, tmp_path: Path, room: str
+) -> None:
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim" / "mine.txt").write_text("kept")
+    path = views / "000003.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "room": room}))
+    out = tmp_path / "out"
+    words = [str(views), "--out", str(out), "--photos", "2", "--photo-size", "16"]
+    call = CliRunner().invoke(command, words)
+    assert "cannot be a folder" in call.stderr
+    assert [p.name for p in out.iterdir()] == ["box"]
+    assert (tmp_path / "victim" / "mine.txt").read_text() == "kept"

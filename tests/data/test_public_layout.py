@@ -192,15 +192,26 @@ def test_compact_and_public_convert_both_ways(tmp_path):
     stems = [tmp_path / "compact" / f"{i:06d}" for i in range(2)]
     for view, stem in zip(originals, stems, strict=True):
         save_rendered(view, stem)
-    [scene] = compact_to_public(stems, tmp_path / "public")
+    [scene] = compact_to_public(stems, tmp_path / "public").written
     assert scene.name == "000000"
-    back = public_to_compact(tmp_path / "public", tmp_path / "back")
+    back = public_to_compact(tmp_path / "public", tmp_path / "back").written
     assert [b.name for b in back] == ["000000_1", "000000_2"]
     for stem, original in zip(back, originals, strict=True):
         view = load_rendered(stem)
         assert np.allclose(as_taken(view), as_taken(original), rtol=3e-3, atol=1e-5)
         assert np.array_equal(view.on, original.on)
         assert view.room == original.room
+
+
+def test_what_is_not_known_of_a_scene_does_not_stop_it(tmp_path):
+    """Python writes NaN into JSON; where no number is needed it is as good as none."""
+    folder = write_scene(tmp_path / "public", "000007", [panorama(height=16)])
+    for path in folder.glob("*.json"):
+        about = json.loads(path.read_text())
+        about["envmap"]["env_strength"] = float("nan")
+        path.write_text(json.dumps(about))
+    [stem] = public_to_compact(folder, tmp_path / "back").written
+    assert load_rendered(stem).metadata["envmap"]["env_strength"] is None
 
 
 def test_scenes_that_do_not_fit_are_refused(tmp_path):
@@ -216,6 +227,28 @@ def test_scenes_that_do_not_fit_are_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_scene_of_ours_is_written_again_and_no_other_is_replaced(tmp_path):
+    folder = write_scene(tmp_path, "000007", [panorama(height=16)])
+    write_scene(tmp_path, "000007", [panorama(height=16), panorama((4.0, 3.0, 1.4), height=16)])
+    assert open_scenes(folder)[0].views == [1, 2]
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"notes\.txt, which would be lost"):
+        write_scene(tmp_path, "000007", [panorama(height=16)])
+    (folder / "notes.txt").unlink()
+    # A scene of the public dataset has the same names; what made it is not in its metadata.
+    about = json.loads((folder / "0000.meta.json").read_text())
+    del about["source"]
+    (folder / "0000.meta.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match="000007 was not written by this program"):
+        write_scene(tmp_path, "000007", [panorama(height=16)])
+    assert open_scenes(folder)[0].views == [1, 2]
+    (tmp_path / "000008").mkdir()
+    write_scene(tmp_path, "000008", [panorama(height=16)])
+    (tmp_path / "000009").write_text("mine")
+    with pytest.raises(InputError, match="000009 is a file"):
+        write_scene(tmp_path, "000009", [panorama(height=16)])
+
+
 @pytest.mark.parametrize(
     "damage",
     [
@@ -223,6 +256,15 @@ def test_scenes_that_do_not_fit_are_refused(tmp_path):
         lambda about: about["camera_pose"].clear(),
         lambda about: about["camera_pose"][0].update(rotation=[0, 0, 0, 0]),
         lambda about: about["lighting"][0].update(power="strong"),
+        lambda about: about["lighting"][0].update(power=float("inf")),
+        lambda about: about["lighting"][0].update(power=10**400),
+        lambda about: about["lighting"][0].update(color=[1, float("nan"), 1]),
+        lambda about: about["lighting"][0].update(id="another"),
+        lambda about: about["lighting"].__setitem__(0, "lamp"),
+        lambda about: about["camera_pose"][0].update(position=[float("nan"), 0, 0]),
+        lambda about: about["source"].update(exposure="bright"),
+        lambda about: about["source"].update(exposure=0),
+        lambda about: about.update(source="nobody"),
     ],
 )
 def test_damaged_metadata_are_one_sentence(tmp_path, damage):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from luxcore.cli.export import command as export
 from luxcore.cli.relight import command as relight
 from luxcore.errors import FormatError, InputError
 from luxcore.splats.relighting import LampSetting, baked_gaussians, render_scene, solo
-from luxcore.splats.scene import Scene
+from luxcore.splats.scene import Scene, save_scene
 
 MIX = ["--set", "floor=0.5,#ff8000", "--set", "ambient=0.25"]
 
@@ -163,6 +164,40 @@ def test_what_makes_no_sense_is_refused(
     with pytest.raises(InputError, match=fact):
         run(written[0], *arguments)
     assert [path.name for path in tmp_path.iterdir()] == ["scene"]
+
+
+def test_the_scene_itself_is_not_replaced(tmp_path: Path, written) -> None:
+    folder = written[0]
+    held = (folder / "splats.ply").read_bytes()
+    (tmp_path / "link").symlink_to(folder)
+    for out in (folder / "splats.ply", tmp_path / "link" / "splats.ply"):
+        with pytest.raises(InputError, match="is a file of the scene itself"):
+            run(folder, "--out", out)
+    assert (folder / "splats.ply").read_bytes() == held
+    for _ in range(2):
+        run(folder, "--out", folder / "mix.ply")
+
+
+def test_a_folder_of_other_models_is_not_replaced(tmp_path: Path, written) -> None:
+    mine = tmp_path / "models" / "01_chair.ply"
+    mine.parent.mkdir()
+    mine.write_text("kept")
+    with pytest.raises(InputError, match=r"01_chair\.ply, which would be lost"):
+        run(written[0], "--lamps", "--out", mine.parent)
+    assert mine.read_text() == "kept"
+    for _ in range(2):
+        run(written[0], "--lamps", "--out", tmp_path / "set")
+
+
+def test_a_scene_without_gaussians_or_views_is_one_sentence(tmp_path: Path, written) -> None:
+    scene = written[1]
+    nothing = replace(scene, gaussians=scene.gaussians.take(np.zeros(60, bool)), views=0)
+    save_scene(tmp_path / "empty", replace(nothing, radiance=scene.radiance[:0]), written[2])
+    with pytest.raises(InputError, match="0 Gaussians"):
+        run(tmp_path / "empty", "--format", "glb", "--out", tmp_path / "x.glb")
+    with pytest.raises(InputError, match="has no views"):
+        run(tmp_path / "empty", "--format", "nerfstudio", "--out", tmp_path / "x")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "scene"]
 
 
 def _newer(folder: Path) -> None:

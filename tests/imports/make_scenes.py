@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import bpy
@@ -81,7 +81,9 @@ def hostile(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    out = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    out = parser.parse_args().folder
     lights(out)
     glowing(out)
     hostile(out)

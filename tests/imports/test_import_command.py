@@ -16,6 +16,8 @@ from luxcore.data.panorama import directions_of_pixels
 from luxcore.data.public_files import FolderFiles
 from luxcore.data.public_reader import PublicScene, open_scenes
 from luxcore.errors import FormatError, InputError
+from luxcore.imports.scene_file import SceneData, SceneMesh
+from luxcore.imports.scene_room import scene_to_room
 from luxcore.imports.standpoints import APART_M, CLEARANCE_M, standpoints
 
 ROOM = """make_wall, id=0, a_x=0, a_y=0, a_z=0, b_x=4, b_y=0, b_z=0, height=2.6
@@ -173,6 +175,38 @@ def test_the_cameras_of_the_file_come_first_where_they_are_free() -> None:
     assert np.linalg.norm(second - first) > 3
     # Where no camera is inside, one outside is what the file wants to be seen from.
     assert standpoints(room, 1.5, [outside, 10 * outside], 2)[0] == pytest.approx(outside)
+
+
+def shining(*watts: tuple[float, float, float], **lens: object) -> SceneData:
+    """A sloping surface that shines in as many colours, side by side, and one camera."""
+    corners = np.array([[x, y, z] for x, z in ((0, 0), (2, 1), (4, 2.6)) for y in (0, 3)], float)
+    faces = ((0, 1, 3, 2), (2, 3, 5, 4))[: len(watts)]
+    plain = {"color": [0.8] * 3, "roughness": 0.5, "metallic": 0.0, "transmission": 0.0, "ior": 1.5}
+    materials = tuple({"name": f"m{i}", "emission": list(w), **plain} for i, w in enumerate(watts))
+    mesh = SceneMesh("m", None, corners, faces, np.arange(len(watts)), materials)
+    camera = {"name": "c", "perspective": True, "angle": 1.0, "fit": "AUTO", "size": [64, 48]}
+    seen = {"matrix": np.eye(4).tolist(), "shift": [0.0, 0.0], **camera, **lens}
+    return SceneData(Path("a.blend"), (mesh,), (), (seen,), 1.0)
+
+
+@pytest.mark.parametrize(
+    "parent", [np.eye(3), np.diag([-2.0, 2, 2]), np.eye(3) + 0.2 * np.eye(3, k=1)]
+)
+def test_a_camera_under_a_parent_that_bends_space_is_a_rotation(parent: np.ndarray) -> None:
+    """Blender allows parents that mirror or skew; the camera looks where it did."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = parent, (1, 1, 1)
+    (seen,) = scene_to_room(shining((5.0, 5.0, 5.0), matrix=matrix.tolist())).cameras
+    assert seen.c2w[:3, :3] @ seen.c2w[:3, :3].T == pytest.approx(np.eye(3))
+    assert seen.c2w[:3, 2] == pytest.approx(-parent[:, 2] / np.linalg.norm(parent[:, 2]))
+    assert seen.centre == pytest.approx([1, 1, 1])
+
+
+def test_lamps_of_one_mesh_have_names_of_their_own() -> None:
+    lamps = scene_to_room(shining((5.0, 0.0, 0.0), (0.0, 5.0, 0.0))).room.lamps
+    assert sorted(lamp.name for lamp in lamps) == ["m_0", "m_1"]
+    (lamp,) = scene_to_room(shining((5.0, 0.0, 0.0))).room.lamps
+    assert lamp.name == "m"
 
 
 def test_a_cupboard_still_has_one_standpoint() -> None:

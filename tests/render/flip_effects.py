@@ -7,6 +7,7 @@ than a tenth of the picture's mean.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 from dataclasses import replace
@@ -89,6 +90,7 @@ def _with_ball(room: Room, material: Material) -> Room:
 
 def main() -> None:
     """Print the JSON on a line of its own; Blender's chatter goes to standard error."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     answer = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     found = {n: flip(*case, field=n.split(" ")[0]) for n, case in cases().items()}

@@ -15,7 +15,7 @@ from luxcore.cli.render import command
 from luxcore.data.compact import list_rendered, load_rendered
 from luxcore.data.public_reader import public_views
 from luxcore.errors import InputError, LuxError
-from luxcore.render import dataset
+from luxcore.render import dataset, public
 from luxcore.render.dataset import (
     check_disk,
     demo_jobs,
@@ -118,6 +118,45 @@ def test_a_room_that_fails_is_set_aside_and_the_rest_goes_on(tmp_path: Path) -> 
     strict = TINY.model_copy(update={"max_failed_ratio": 0.4})
     with pytest.raises(LuxError, match="1 of 2 views failed: train/000000"):
         run_jobs(jobs, tmp_path / "strict", strict, store, SerialExecutor())
+
+
+@pytest.mark.parametrize(
+    ("taken", "fact"),
+    [
+        ("000011/mine.txt", "holds mine.txt"),
+        ("000011", "000011 is a file"),
+        ("work/mine.txt", "holds mine.txt"),
+        ("training-0000.tar", "training-0000.tar was not written by this program"),
+    ],
+)
+def test_what_is_not_ours_is_refused_before_any_rendering(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: str, fact: str
+) -> None:
+    def render(*_: object) -> None:
+        pytest.fail("a view was rendered")
+
+    monkeypatch.setattr(public, "run_jobs", render)
+    mine = tmp_path / "set" / taken
+    mine.parent.mkdir(parents=True)
+    mine.write_text("kept")
+    arguments = ["--rooms", "2", "--seed", "10", "--shards", "training"]
+    result = CliRunner().invoke(command, [*arguments, "--out", str(tmp_path / "set")])
+    assert isinstance(result.exception, InputError)
+    assert fact in str(result.exception)
+    assert [p for p in (tmp_path / "set").rglob("*") if p.is_file()] == [mine]
+    assert mine.read_text() == "kept"
+
+
+@pytest.mark.blender
+def test_rendering_again_replaces_what_it_wrote(tmp_path: Path) -> None:
+    out = tmp_path / "set"
+    arguments = ["--rooms", "1", "--seed", "11", "--size", "32x16", "--spp", "1", "--views", "1"]
+    for more in ([], [], ["--shards", "training"], ["--shards", "training"]):
+        result = CliRunner(env={"LUX_EXECUTOR": "serial"}).invoke(
+            command, [*arguments, *more, "--out", str(out)]
+        )
+        assert result.exit_code == 0, result.output
+    assert (out / "training-0000.tar").is_file()
 
 
 @pytest.mark.parametrize("size", ["64x33", "64", "axb", "16x8", "x", "-64x-32"])

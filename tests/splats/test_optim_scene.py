@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from luxcore.cli.lamp_options import parse_lamp_settings
 from luxcore.cli.relight import command as relight
 from luxcore.cli.splat import command as splat
 from luxcore.errors import FormatError, InputError
+from luxcore.files.digests import file_digest
 from luxcore.files.exr import read_exr_image
 from luxcore.files.photos import read_photo
 from luxcore.light.agx import agx
@@ -78,7 +80,7 @@ def test_damage_version_and_mismatch_are_refused(folder: Path) -> None:
     with pytest.raises(FormatError, match="of version 2, this program reads 1"):
         load_scene(folder)
     (folder / "scene.json").write_text("[1, 2")
-    with pytest.raises(FormatError, match="not a scene description"):
+    with pytest.raises(FormatError, match=r"scene\.json is not readable JSON"):
         load_scene(folder)
     with pytest.raises(InputError, match="is not a scene"):
         load_scene(folder / "nowhere")
@@ -89,6 +91,47 @@ def test_missing_lamp_in_the_description_is_refused(folder: Path) -> None:
     about["lamps"].pop()
     (folder / "scene.json").write_text(json.dumps(about))
     with pytest.raises(FormatError, match=r"holds 3 lights, .* names 1 lamps"):
+        load_scene(folder)
+
+
+@pytest.mark.parametrize(
+    ("damage", "fact"),
+    [
+        (lambda about: about["tone"].update(exposure=float("nan")), "exposure is NaN"),
+        (lambda about: about["tone"].update(exposure=0), "exposure is 0"),
+        (lambda about: about["tone"].update(gamma=float("inf")), "gamma is Infinity"),
+        (lambda about: about["tone"].update(beta="dark"), 'beta is "dark"'),
+        (lambda about: about["tone"].pop("beta"), "'beta'"),
+        (lambda about: about["lamps"][1].update(scale=[1, 1, float("nan")]), "scale of lamp floor"),
+        (lambda about: about["lamps"][0].update(index=-1), "index of lamp desk"),
+        (lambda about: about.update(ambient_scale=[1, 10**400, 1]), "ambient_scale"),
+        (lambda about: about.update(ambient_scale={"red": 1}), "ambient_scale"),
+        (lambda about: about.update(views=float("inf")), "views is Infinity"),
+        (lambda about: about.update(views=2.5), "views is 2.5"),
+        (lambda about: about.update(tone=[1, 2, 3]), "usable"),
+        (lambda about: about["lamps"][1].update(name="desk"), "two lights are called 'desk'"),
+        (lambda about: about["lamps"][1].update(name="ambient"), "two lights are called 'ambient'"),
+    ],
+)
+def test_numbers_that_are_none_name_the_file_and_the_fact(folder: Path, damage, fact: str) -> None:
+    about = json.loads((folder / "scene.json").read_text())
+    damage(about)
+    (folder / "scene.json").write_text(json.dumps(about))
+    with pytest.raises(FormatError, match=rf"scene\.json.*{fact}"):
+        load_scene(folder)
+
+
+@pytest.mark.parametrize(("kind", "size"), [("BF16", 2), ("F8_E4M3", 1), ("F64", 8), ("none", 1)])
+def test_lights_of_another_type_are_refused(folder: Path, kind: str, size: int) -> None:
+    count = 800 * 3 * 3 * size
+    entry = {"dtype": kind, "shape": [800, 3, 3], "data_offsets": [0, count]}
+    header = json.dumps({"radiance": entry}).encode()
+    path = folder / "lights.safetensors"
+    path.write_bytes(struct.pack("<Q", len(header)) + header + bytes(count))
+    about = json.loads((folder / "scene.json").read_text())
+    about["digests"][path.name] = file_digest(path)
+    (folder / "scene.json").write_text(json.dumps(about))
+    with pytest.raises(FormatError, match=r"lights\.safetensors.* radiance"):
         load_scene(folder)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from click.testing import CliRunner
 from luxcore.cli.statistics import command
 from luxcore.data.compact import RenderedView, save_rendered
 from luxcore.data.public_writer import write_scene, write_shards
-from luxcore.errors import InputError
+from luxcore.errors import FormatError, InputError
 from luxcore.statistics.charts import histogram, short
 from luxcore.statistics.facts import facts_of_files
 from luxcore.statistics.page import headline, measures, quantiles, remarks
@@ -55,6 +56,30 @@ def test_facts_are_those_of_the_files(dataset: Path) -> None:
     assert [m.emitter_px for m in facts.lamps] == [int(m.sum()) for m in view.masks["emitter"]]
     assert facts.window_px == int(view.window.sum())
     assert facts.seconds == {"render": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("damage", "fact"),
+    [
+        (lambda about: about["lamps"].append(about["lamps"][0]), "emitter_02"),
+        (lambda about: about["lamps"][0].pop("kind"), "kind"),
+        (lambda about: about["lamps"][0].update(power_w=float("nan")), "power_w is null"),
+        (lambda about: about["noise"].update(light_01="loud"), 'light_01 is "loud"'),
+        (lambda about: about.update(noise=3), "do not agree"),
+        (lambda about: about.update(spp="many"), 'spp is "many"'),
+        (lambda about: about.update(effects={"glass": "yes"}), "do not agree"),
+    ],
+)
+def test_a_view_whose_files_differ_is_one_sentence(dataset: Path, damage, fact: str) -> None:
+    path = dataset / "train" / "000001.json"
+    about = json.loads(path.read_text())
+    damage(about)
+    path.write_text(json.dumps(about))
+    result = CliRunner().invoke(command, [str(dataset)])
+    assert isinstance(result.exception, FormatError)
+    assert "000001.json" in str(result.exception)
+    assert fact in str(result.exception)
+    assert not (dataset / "statistics.html").exists()
 
 
 def test_counts_and_remarks(dataset: Path) -> None:
