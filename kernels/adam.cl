@@ -1,12 +1,13 @@
 // Adam (Kingma & Ba 2015), one work-item per value, in place.
 //
-// A row (one Gaussian) whose `visible` is 0 is left alone, moments included: an unseen Gaussian
-// has gradient zero in every entry, and stepping it would only let old momentum move it.
+// A row (one Gaussian) whose `visible` is 0 is left alone, moments included: under a loss of one
+// view an unseen Gaussian has gradient zero in every entry, and stepping it would only let old
+// momentum move it. A step with a loss of all Gaussians marks all of them as visible.
 // The first `head` values of a row step by `rate` and are kept >= `lower`; the rest step by
 // `tail_rate` (higher spherical harmonics). The bound is a projection after the step, which, unlike
 // a clamp in the forward pass, does not stop the gradient.
 // Twin: torch.optim.Adam (all visible). Compile-time: none.
-#line 10 "adam.cl"
+#line 11 "adam.cl"
 
 __kernel void adam(__global float *values, __global const float *gradients,
                    __global float *first, __global float *second,

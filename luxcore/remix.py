@@ -15,7 +15,9 @@ from luxcore.capture import Capture, ingest, load_capture, placed_sentence
 from luxcore.decompose.stage import decompose_capture
 from luxcore.errors import InputError
 from luxcore.files.digests import tree_digest
+from luxcore.harmonize.stage import CODE as HARMONIZE_CODE
 from luxcore.harmonize.stage import harmonize_capture
+from luxcore.light.fuse import CODE as FUSE_CODE
 from luxcore.light.fuse import fuse_capture
 from luxcore.masks import find_lamps
 from luxcore.settings.base import Settings
@@ -31,8 +33,8 @@ _CODE = {
     "masks": ("luxcore/masks", "luxcore/light"),
     "splat": ("luxcore/splats", "kernels"),
     "decompose": ("luxcore/decompose", "luxcore/models", "luxcore/light"),
-    "harmonize": ("luxcore/harmonize", "luxcore/models", "luxcore/light"),
-    "fuse": ("luxcore/light",),
+    "harmonize": HARMONIZE_CODE,
+    "fuse": FUSE_CODE,
     "relight": ("luxcore/splats", "kernels", "luxcore/light"),
 }
 
@@ -95,12 +97,12 @@ def _run(source: Path, work: _Work, log: Log) -> Path:
     splat = work.step("splat", [captured], lambda o: _geometry(capture, o, work, log))
     decomposed = work.step(
         "decompose",
-        [captured, masks, splat],
+        [captured, masks, splat, *_local(settings.decompose.weights)],
         lambda o: decompose_capture(captured, masks, splat, o, settings.decompose, seed=seed),
     )
     harmonized = work.step(
         "harmonize",
-        [captured, masks, splat, decomposed],
+        [captured, masks, splat, decomposed, *_local(settings.harmonize.weights)],
         lambda o: harmonize_capture(
             captured, masks, splat, decomposed, o, settings.harmonize, work.store, seed=seed
         ),
@@ -125,6 +127,11 @@ def _run(source: Path, work: _Work, log: Log) -> Path:
             log=log,
         ),
     )
+
+
+def _local(weights: str | None) -> list[Path]:
+    """Weights that lie here: other bytes under the same name make a step stale."""
+    return [Path(weights)] if weights and Path(weights).exists() else []
 
 
 def _geometry(capture: Capture, out: Path, work: _Work, log: Log) -> None:

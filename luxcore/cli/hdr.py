@@ -41,6 +41,8 @@ def merge(photos: tuple[Path, ...], times: str | None, out: Path, as_json: bool)
         "photos": len(photos),
         "clipped": merged.clipped,
         "black": merged.black,
+        "gaps": merged.gaps,
+        "unknown": merged.unknown,
         "disagreeing": merged.disagreeing,
     }
     if as_json:
@@ -49,5 +51,6 @@ def merge(photos: tuple[Path, ...], times: str | None, out: Path, as_json: bool)
     height, width = merged.radiance.shape[:2]
     click.echo(
         f"{out}: {width}x{height} from {len(photos)} photos; pixels white in all {merged.clipped}, "
-        f"black in all {merged.black}, contradictory {merged.disagreeing}"
+        f"black in all {merged.black}, between exposures {merged.gaps}, "
+        f"not finite {merged.unknown}, contradictory {merged.disagreeing}"
     )

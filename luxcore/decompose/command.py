@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from luxcore.decompose.burning import burning_lamps
 from luxcore.errors import InputError
 from luxcore.files.atomic import atomic_folder
 from luxcore.files.exr import read_exr_image
 from luxcore.files.output import check_out_folder
 from luxcore.files.photos import read_mask, read_photo, write_png
+from luxcore.light.burning import burning_lamps
+from luxcore.light.exposure import BRACKETS_EV
 
 if TYPE_CHECKING:
     from luxcore.decompose.photo import PhotoLight
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 MIN_SIDE_PX = 16
 WRITTEN = ("ambient.exr", "light_*.exr", "lights.json", "blend.html", "pictures")
-BRACKETS_EV = (0, 2, 4)
 
 
 def decompose_file(
@@ -144,9 +144,9 @@ def _write(
     light = result.light
     write_light(folder, result, names, 1.0, np.ones(len(names), bool))
     for k, lamp in enumerate(light.contributions()):
-        for stops in BRACKETS_EV:
-            picture = agx(lamp * np.float32(2.0**-stops))
-            write_png(folder / "pictures" / f"light_{k:02d}_ev{stops}.png", picture)
+        for ev in BRACKETS_EV:
+            picture = agx(lamp * np.float32(2.0**ev))
+            write_png(folder / "pictures" / f"light_{k:02d}_ev{abs(ev):g}.png", picture)
         if result.on[k]:
             write_png(folder / "pictures" / f"without_{k:02d}.png", agx(light.one_light_off(k)))
     write_explorer(

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from luxcore.decompose.burning import burning_lamps
 from luxcore.errors import DivergedError
 from luxcore.light.agx import agx
+from luxcore.light.burning import burning_lamps
+from luxcore.metrics.image import psnr
 from luxcore.models.interface import Decomposer, Decomposition, Geometry
 
 EXACT_DB = 60.0
@@ -79,9 +79,8 @@ def _best_scale(
 
 
 def _recomposition_db(shown: Float[np.ndarray, "h w 3"], light: Decomposition) -> float:
-    """PSNR in dB, at most 99, of the recomposed photo through AgX against the photo as shown."""
-    error = float(np.mean((agx(light.recomposed()) - shown) ** 2, dtype=np.float64))
-    return min(99.0, -10 * math.log10(max(error, 1e-10)))
+    """PSNR in dB of the recomposed photo through AgX against the photo as shown."""
+    return psnr(np.asarray(agx(light.recomposed())), shown)
 
 
 def scaled_by(light: Decomposition, factor: float) -> Decomposition:

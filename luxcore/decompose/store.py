@@ -6,19 +6,18 @@ lights.json                    scale, on, names, exposure, recomposition_db
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
 
 from luxcore.decompose.photo import PhotoLight
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import HALF_MAX, read_exr_image, write_exr
+from luxcore.files.json_object import read_object
 from luxcore.models.interface import Decomposition
 
 
@@ -59,7 +58,7 @@ def write_light(
 def read_light(folder: Path) -> StoredLight:
     """The inverse of `write_light`. Raises InputError or FormatError naming the file."""
     path = Path(folder) / "lights.json"
-    about = _read_about(path)
+    about = read_object(path)
     try:
         scale = np.array(about["scale"], np.float32).reshape(-1, 3)
         on, known = np.array(about["on"], bool), np.array(about["known"], bool)
@@ -70,15 +69,3 @@ def read_light(folder: Path) -> StoredLight:
     olats = [read_exr_image(folder / f"light_{i:02d}.exr") for i in range(len(scale))]
     olat = np.stack(olats) if olats else np.zeros((0, *ambient.shape), np.float32)
     return StoredLight(Decomposition(ambient, olat, scale), on, known, exposure)
-
-
-def _read_about(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"{path} is not readable JSON: {error}.") from error
-    if not isinstance(about, dict):
-        raise FormatError(f"{path} must hold a JSON object.")
-    return about

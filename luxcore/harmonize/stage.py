@@ -10,7 +10,7 @@ from typing import Any
 from luxcore.capture import Capture, load_capture
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
-from luxcore.files.digests import file_digest, tree_digest
+from luxcore.files.digests import tree_digest
 from luxcore.harmonize.plan import Pass, PassPlan, plan_passes
 from luxcore.harmonize.poses import pose_distance, views_linked
 from luxcore.progress import progress
@@ -18,8 +18,19 @@ from luxcore.settings.harmonize import HarmonizeSettings
 from luxcore.units import Unit, UnitStore, run_units
 from luxcore.units.store import unit_key
 
-CODE = ("luxcore/harmonize", "luxcore/decompose", "luxcore/models/small", "luxcore/light")
-"""Code whose change makes finished passes stale."""
+CODE = (
+    "luxcore/harmonize",
+    "luxcore/models",
+    "luxcore/decompose",
+    "luxcore/capture",
+    "luxcore/masks",
+    "luxcore/light",
+    "luxcore/files",
+    "luxcore/cameras.py",
+    "luxcore/settings/paper_models.py",
+)
+"""Code whose change makes finished passes stale, whichever backend made them; the weights that
+backends ship with are in it."""
 
 
 def harmonize_capture(
@@ -100,14 +111,15 @@ def _run(
     store: UnitStore,
     capture_id: str,
 ) -> list[Path]:
-    digests = _input_digests(inputs, shared["weights"])
+    digests = _input_digests(inputs)
+    keyed = {**shared, "weights": _weights_identity(shared["weights"])}
     folders: list[Path] = []
     done_in: dict[int, int] = {}
     keys: list[str] = []
     with progress(f"harmonize {capture_id}", len(plan.passes), "passes") as bar:
         for index, step in enumerate(plan.passes):
             before = {view: done_in[view] for view in step.secondary}
-            key = _key(step, shared, [*digests, *(keys[p] for p in sorted(set(before.values())))])
+            key = _key(step, keyed, [*digests, *(keys[p] for p in sorted(set(before.values())))])
             arguments = {
                 "inputs": inputs,
                 "targets": list(step.targets),
@@ -124,28 +136,30 @@ def _run(
     return folders
 
 
-def _key(step: Pass, shared: dict[str, Any], digests: list[str]) -> str:
+def _key(step: Pass, keyed: dict[str, Any], digests: list[str]) -> str:
     about = {
         "targets": list(step.targets),
         "references": list(step.references),
         "secondary": list(step.secondary),
-        # Where the weights lie is no part of what they are: their digest is.
-        **{k: v for k, v in shared.items() if k != "weights"},
+        **keyed,
     }
     return unit_key(CODE, about, digests)
 
 
-def _input_digests(inputs: dict[str, str | None], weights: str | None) -> list[str]:
+def _weights_identity(weights: str | None) -> str | None:
+    """What the weights are, wherever they lie: a digest of local ones, else their hub id."""
+    path = Path(weights) if weights else None
+    if path is None or not path.exists():
+        return weights
+    return tree_digest([path], path)
+
+
+def _input_digests(inputs: dict[str, str | None]) -> list[str]:
     digests = []
     for folder in inputs.values():
         root = Path(folder) if folder else None
         files = [root / "depth"] if root and (root / "depth").is_dir() else [root]
         digests.append(tree_digest([f for f in files if f], root) if root else "none")
-    path = Path(weights) if weights else None
-    if path is not None and path.is_file():
-        digests.append(file_digest(path))
-    elif path is not None and path.is_dir():
-        digests.append(tree_digest([path], path))
     return digests
 
 

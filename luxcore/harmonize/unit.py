@@ -17,12 +17,10 @@ from luxcore.errors import FormatError
 from luxcore.files.exr import HALF_MAX, read_exr, write_exr
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
+from luxcore.light.exposure import BRACKETS_EV
 from luxcore.masks.store import load_masks
 from luxcore.models.backends import open_harmonizer
 from luxcore.models.interface import BackendSettings, Decomposition, Reference, View
-
-BRACKETS_EV = (0, 2, 4)
-"""Stops by which the three exposures of a lamp are darkened: EV0, EV-2, EV-4 (paper, 3.3)."""
 
 
 def harmonize_pass(
@@ -62,16 +60,19 @@ def harmonize_pass(
 
 
 def write_target(out_dir: Path, index: int, light: Decomposition, exposure: float) -> None:
-    """The linear lights of a view and, per lamp, its three exposures AgX(2^-k · g · I)."""
+    """The linear lights of a view and, per lamp, its three exposures AgX(2^ev · g · I).
+
+    `_evK` of a file name is K stops below EV 0.
+    """
     contribution = light.contributions()
     layers = {"ambient": light.ambient}
     layers |= {f"light_{k:02d}": pixels for k, pixels in enumerate(contribution)}
     half = all(float(np.abs(p).max(initial=0)) <= HALF_MAX for p in layers.values())
     write_exr(out_dir / "direct" / f"{index:04d}.exr", layers, half=half)
     for name, pixels in {"ambient": light.ambient, **_numbered(contribution)}.items():
-        for stops in BRACKETS_EV:
-            shown = agx(pixels * np.float32(exposure * 2.0**-stops))
-            write_png(out_dir / "brackets" / f"{index:04d}_{name}_ev{stops}.png", shown)
+        for ev in BRACKETS_EV:
+            shown = agx(pixels * np.float32(exposure * 2.0**ev))
+            write_png(out_dir / "brackets" / f"{index:04d}_{name}_ev{abs(ev):g}.png", shown)
 
 
 def _numbered(lights: Float[np.ndarray, "k h w 3"]) -> dict[str, np.ndarray]:

@@ -4,8 +4,7 @@ The same image as EaryChow's OpenColorIO configuration, "Linear Rec.709" → "Ag
 interpolates a 57³ table of a formula between nodes half a stop apart. On saturated colours that
 interpolation moves the result by up to 15/255, so it belongs to the definition: here the nodes come
 from the formula (`agx_closed`) and tetrahedra join them. One code serves numpy and torch (any float
-precision; differentiable in torch). `kernels/agx.clh` and `agx_glsl` are the same for OpenCL and
-for the browser.
+precision; differentiable in torch). `agx_glsl` is the same for the browser.
 """
 
 from __future__ import annotations

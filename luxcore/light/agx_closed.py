@@ -22,10 +22,10 @@ def formed_from_scene(linear: Array) -> Array:
     """Display-linear Rec.709 in 0..1, [..., 3], of scene-linear Rec.709 [..., 3]."""
     xp = namespace(linear)
     wide = colour_matrix(linear, k.REC2020_FROM_709)
-    scene = colour_matrix(_guard_rail(xp, wide, k.LUMINANCE_2020, fade=False), k.INSET)
+    scene = colour_matrix(_guard_rail(xp, wide, k.CIE2015_LUMINANCE_2020, fade=False), k.INSET)
     formed = colour_matrix(_mix_hue(xp, scene, _curve(xp, scene)), k.OUTSET)
     narrow = colour_matrix(formed, k.REC709_FROM_2020)
-    return xp.clip(_guard_rail(xp, narrow, k.LUMINANCE_709, fade=True), 0.0, 1.0)
+    return xp.clip(_guard_rail(xp, narrow, k.CIE2015_LUMINANCE_709, fade=True), 0.0, 1.0)
 
 
 def scene_from_formed(formed_709: Array) -> Array:

@@ -28,7 +28,7 @@ LATTICE_SIZE = 57
 LATTICE_MIN_EV, LATTICE_MAX_EV = -10.0, 15.0
 """The published table: nodes per axis, and the stops around middle grey that an axis spans."""
 
-LUMINANCE_2020 = np.array([0.2658180370250449, 0.59846986045365, 0.1357121025213052])
+CIE2015_LUMINANCE_2020 = np.array([0.2658180370250449, 0.59846986045365, 0.1357121025213052])
 """Weights of Rec.2020 channels in the guard rails' luminance (CIE 2015 observer)."""
 
 COMPENSATION_POWER = 0.08
@@ -78,7 +78,7 @@ OUTSET_INVERSE = np.array(
     ]
 )
 OUTSET = np.linalg.inv(OUTSET_INVERSE)
-LUMINANCE_709 = LUMINANCE_2020 @ REC2020_FROM_709
+CIE2015_LUMINANCE_709 = CIE2015_LUMINANCE_2020 @ REC2020_FROM_709
 """The same luminance, as weights of Rec.709 channels."""
 
 

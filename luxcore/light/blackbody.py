@@ -12,6 +12,8 @@ from luxcore.errors import InputError
 
 MIN_KELVIN, MAX_KELVIN = 800.0, 40_000.0
 LUMINANCE_709 = np.array([0.2126, 0.7152, 0.0722])
+"""Weights of linear Rec.709 channels in luminance (ITU-R BT.709; CIE 1931 observer)."""
+
 HSV_JITTER = 0.1
 
 _SECOND_RADIATION_M_K = 1.438776877e-2

@@ -1,4 +1,4 @@
-"""Which exposure a photographer would choose for a linear image."""
+"""Which exposure a photographer would choose for a linear image, and the brackets around it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from luxcore.light.blackbody import LUMINANCE_709
+
+BRACKETS_EV = (0.0, -2.0, -4.0)
+"""The brightness levels that models are asked for and that a lamp's HDR light is merged from
+(paper, 3.2 and 3.3)."""
 
 KEY_LUMINANCE = 0.18
 """Where the middle of the picture is put: middle grey."""

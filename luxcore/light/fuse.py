@@ -29,7 +29,7 @@ CODE = ("luxcore/light", "luxcore/files")
 """Code whose change makes finished views stale."""
 
 _BRACKET = re.compile(r"(?P<view>\d{4})_(?P<light>ambient|\d{2})_ev(?P<stops>\d+)\.png")
-_COUNTS = ("clipped", "black", "unknown", "disagreeing")
+_COUNTS = ("clipped", "black", "gaps", "unknown", "disagreeing")
 
 
 def fuse_capture(
@@ -42,8 +42,9 @@ def fuse_capture(
 ) -> dict[str, float]:
     """Write `NNNN.exr` (ambient, light_00, …, float32) of every view and `fuse.json` into `out`.
 
-    Returns flat metrics: shares of pixels that were clipped, black, unknown or contradictory in the
-    exposures that were merged, and the median relative difference to the model's own linear light.
+    Returns flat metrics: shares of pixels that were clipped, black, between two exposures, unknown
+    or contradictory in the exposures that were merged, and the median relative difference to the
+    model's own linear light.
     Raises InputError or FormatError naming a missing or unfit file.
     """
     exposure = capture.exposure or 1.0
@@ -76,7 +77,7 @@ def fuse_view(
         if not merge:
             layers[name] = np.maximum(linear, 0.0)
             continue
-        merged = merge_files(_bracket_paths(root, view, name), exposure)
+        merged = merge_files(bracket_paths(root, view, name), exposure)
         if merged.radiance.shape != linear.shape:
             raise FormatError(f"{root}: view {view}'s exposures and linear light differ in size.")
         for count in _COUNTS:
@@ -98,6 +99,22 @@ def _chosen(method: Method, merged: np.ndarray, direct: np.ndarray) -> np.ndarra
             return direct
         case _:
             assert_never(method)
+
+
+def bracket_paths(root: Path, view: int, name: str) -> dict[int, Path]:
+    """The exposures of one light of one view, by stops darker than EV 0.
+
+    `root` is a folder of the stage harmonize. Raises InputError where it holds none.
+    """
+    wanted = name.removeprefix("light_")
+    paths = {}
+    for path in sorted((root / "brackets").glob(f"{view:04d}_{wanted}_ev*.png")):
+        match = _BRACKET.fullmatch(path.name)
+        if match:
+            paths[int(match["stops"])] = path
+    if not paths:
+        raise InputError(f"{root / 'brackets'} holds no exposures of {name} in view {view}.")
+    return paths
 
 
 def merge_files(paths: dict[int, Path], exposure: float) -> Merged:
@@ -143,19 +160,6 @@ def _direct(root: Path, view: int) -> dict[str, np.ndarray]:
     if "ambient" not in layers:
         raise FormatError(f"{path} lacks the part ambient.")
     return layers
-
-
-def _bracket_paths(root: Path, view: int, name: str) -> dict[int, Path]:
-    """The exposures of one light of one view, by stops darker than EV 0."""
-    wanted = name.removeprefix("light_")
-    paths = {}
-    for path in sorted((root / "brackets").glob(f"{view:04d}_{wanted}_ev*.png")):
-        match = _BRACKET.fullmatch(path.name)
-        if match:
-            paths[int(match["stops"])] = path
-    if not paths:
-        raise InputError(f"{root / 'brackets'} holds no exposures of {name} in view {view}.")
-    return paths
 
 
 def _summary(records: list[dict[str, Any]]) -> dict[str, float]:

@@ -36,6 +36,8 @@ class Merged:
     """White in every bracket: the radiance is a lower bound."""
     black: int
     """Black in every bracket: the radiance is an upper bound."""
+    gaps: int
+    """White in some brackets and black in all others: the radiance is the middle of both bounds."""
     unknown: int
     """Not finite in every bracket: the radiance is 0."""
     disagreeing: int
@@ -54,7 +56,9 @@ def merge_brackets(
 
     `images` are display values in 0..1. A pixel that is white everywhere gets the darkest bracket's
     bound, one that is black everywhere the brightest bracket's, but not more than `cap_linear` (the
-    photo that the light is a part of). A bracket whose pixel is not finite is left out there.
+    photo that the light is a part of). Where the brackets lie so far apart that a pixel is white in
+    some and black in the rest, it gets the geometric mean of its two closest bounds. A bracket
+    whose pixel is not finite is left out there.
     Raises InputError for no images, differing sizes or exposures that are not finite.
     """
     _check(images, exposures_ev, exposure)
@@ -70,17 +74,26 @@ def merge_brackets(
     radiance = (guess * weight[..., None]).sum(0) / np.where(total > 0, total, 1.0)[..., None]
 
     known = finite.any(0)
-    white = known & (~finite | (shown.max(-1) >= 1 - _HALF_STEP)).all(0)
-    black = known & (~finite | (shown.max(-1) <= _HALF_STEP)).all(0)
-    radiance[white] = _first_finite(guess, finite)[white]
-    shadow = _first_finite(guess[::-1], finite[::-1])
+    is_white = finite & (shown.max(-1) >= 1 - _HALF_STEP)
+    is_black = finite & (shown.max(-1) <= _HALF_STEP)
+    white = known & (~finite | is_white).all(0)
+    black = known & (~finite | is_black).all(0)
+    gap = known & (total == 0) & ~white & ~black
+    radiance[white] = _first(guess, finite)[white]
+    shadow = _first(guess[::-1], finite[::-1])
     if cap_linear is not None:
         shadow = np.minimum(shadow, np.maximum(cap_linear, 0.0))
     radiance[black] = shadow[black]
+    # What a black pixel holds at most: black itself may stand for no light at all.
+    brightest_black = linear(np.full((1, 1, 3), _HALF_STEP, np.float32))[0] / times[:, None]
+    radiance[gap] = _between(
+        guess[:, gap], is_white[:, gap], brightest_black[:, None], is_black[:, gap]
+    )
     return Merged(
         radiance.astype(np.float32),
         clipped=int(white.sum()),
         black=int(black.sum()),
+        gaps=int(gap.sum()),
         unknown=int((~known).sum()),
         disagreeing=_disagreeing(guess, weight),
     )
@@ -99,12 +112,28 @@ def _weight(shown: Image) -> Float[np.ndarray, "h w"]:
     return np.where(usable, hat + fallback, 0.0)
 
 
-def _first_finite(
-    guess: Float[np.ndarray, "b h w 3"], finite: Bool[np.ndarray, "b h w"]
-) -> Float[np.ndarray, "h w 3"]:
-    """Each pixel's guess from the first bracket that is finite there."""
-    first = finite.argmax(0)[None, ..., None]
-    return np.take_along_axis(guess, first, 0)[0]
+def _first(
+    guess: Float[np.ndarray, "b ... 3"], where: Bool[np.ndarray, "b ..."]
+) -> Float[np.ndarray, "... 3"]:
+    """Each pixel's guess from the first bracket where `where` holds."""
+    return np.take_along_axis(guess, where.argmax(0)[None, ..., None], 0)[0]
+
+
+def _between(
+    guess: Float[np.ndarray, "b p 3"],
+    is_white: Bool[np.ndarray, "b p"],
+    brightest_black: Float[np.ndarray, "b 1 3"],
+    is_black: Bool[np.ndarray, "b p"],
+) -> Float[np.ndarray, "p 3"]:
+    """Middle, in stops, of the closest bounds; brackets come from the darkest to the brightest.
+
+    The darkest bracket that is white bounds the radiance from below, the brightest that is black
+    from above.
+    """
+    above = np.broadcast_to(brightest_black, guess.shape)
+    # AgX's inverse of a saturated white may have a negative channel.
+    below = np.maximum(_first(guess, is_white), 0.0)
+    return np.sqrt(below * _first(above[::-1], is_black[::-1]))
 
 
 def _disagreeing(guess: Float[np.ndarray, "b h w 3"], weight: Float[np.ndarray, "b h w"]) -> int:

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from luxcore.capture.drawn_masks import mask_files
-from luxcore.capture.store import Capture, read_object
+from luxcore.capture.store import Capture
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr
+from luxcore.files.json_object import read_object
 from luxcore.files.photos import read_mask, read_photo
+from luxcore.light.agx import agx_inverse
+from luxcore.light.burning import burning_lamps
 from luxcore.masks.references import best_views, photo_sharpness
 from luxcore.masks.store import FoundLamp, Mask
 from luxcore.settings.masks import MasksSettings
-
-ON_RATIO = 1.5
-"""A lamp whose brightest pixels are this much brighter than the median photo pixel is on."""
 
 
 def truth_lamps(capture: Capture, settings: MasksSettings) -> list[FoundLamp]:
@@ -52,7 +52,7 @@ def truth_lamps(capture: Capture, settings: MasksSettings) -> list[FoundLamp]:
 
 
 def folder_lamps(capture: Capture, folder: Path, settings: MasksSettings) -> list[FoundLamp]:
-    """The user's `NNNN_LL.png` masks (view, lamp). On or off is judged from the photos.
+    """The user's `NNNN_LL.png` masks (view, lamp). On or off is judged from the reference photos.
 
     Raises InputError for a name, view, size or mask that cannot be used.
     """
@@ -64,12 +64,7 @@ def folder_lamps(capture: Capture, folder: Path, settings: MasksSettings) -> lis
         mask = read_mask(path, (camera.height, camera.width))
         lamps.setdefault(lamp, {})[view] = mask
     return [
-        FoundLamp(
-            name=f"lamp_{index}",
-            on=_looks_on(capture, lamps[key]),
-            masks=lamps[key],
-            references=best_views(lamps[key], sharpness, settings.references),
-        )
+        _drawn_lamp(capture, f"lamp_{index}", lamps[key], sharpness, settings)
         for index, key in enumerate(sorted(lamps))
     ]
 
@@ -91,9 +86,22 @@ def _truth_mask(path: Path, layers: dict[str, np.ndarray], light: int) -> Mask:
     return mask
 
 
+def _drawn_lamp(
+    capture: Capture,
+    name: str,
+    masks: dict[int, Mask],
+    sharpness: dict[int, float],
+    settings: MasksSettings,
+) -> FoundLamp:
+    references = best_views(masks, sharpness, settings.references)
+    seen = {view: masks[view] for view in references}
+    return FoundLamp(name=name, on=_looks_on(capture, seen), masks=masks, references=references)
+
+
 def _looks_on(capture: Capture, masks: dict[int, Mask]) -> bool:
-    ratios = []
-    for view, mask in masks.items():
-        grey = read_photo(capture.frames[view].image_path).mean(axis=2)
-        ratios.append(np.percentile(grey[mask], 90) / max(float(np.median(grey)), 1e-3))
-    return bool(np.median(ratios) >= ON_RATIO)
+    """Whether the lamp burns in at least half of the photos that it is masked in."""
+    burns = [
+        burning_lamps(agx_inverse(read_photo(capture.frames[view].image_path)), mask[None])[0]
+        for view, mask in masks.items()
+    ]
+    return bool(np.mean(burns) >= 0.5)

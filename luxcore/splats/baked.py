@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pyopencl.array as cla
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from luxcore.splats.device import Device, Kernels
 from luxcore.splats.rasterizer import RasterConfig, RasterOutput
@@ -143,27 +143,62 @@ class BakedView:
 
 def bake(device: Device, out: RasterOutput) -> BakedView:
     """The weights with which a forward pass blended its Gaussians."""
-    camera, saved = out.camera, out.saved
-    columns, tiles = tile_grid(camera)
-    size = np.array([camera.width, camera.height], np.int32)
-    lists = (size, columns, saved.ranges, saved.sorted_ids, saved.records)
+    return _fill(device, _count(device, out))
+
+
+def bake_within(device: Device, out: RasterOutput, limit_bytes: int) -> BakedView | None:
+    """The same, or None where the view would hold more than `limit_bytes`: it is never made."""
+    counts = _count(device, out)
+    return _fill(device, counts) if counts.nbytes <= limit_bytes else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Counts:
+    """How many weights a forward pass has, known before there is memory for them."""
+
+    out: RasterOutput
+    start: Int[np.ndarray, " quads1"]
+    is_drawn: Bool[np.ndarray, " pairs"]
+
+    @property
+    def nbytes(self) -> int:
+        """`BakedView.nbytes` of the baked view."""
+        entries, rows = max(int(self.start[-1]), 1), int(self.is_drawn.sum())
+        tiles, n = len(self.start) // QUADS, self.out.inputs.count
+        # An entry is a row and four weights, a row a Gaussian and its place in the order.
+        return self.start.nbytes + 20 * entries + 8 * rows + 4 * (tiles + 1) + 4 * (n + 1) + n
+
+
+def _count(device: Device, out: RasterOutput) -> _Counts:
+    _, tiles = tile_grid(out.camera)
     counts = device.empty((tiles * QUADS,), np.int32)
-    drawn = device.zeros((max(saved.lists.pairs, 1),), np.uint8)
-    device.launch(_baking(device, 0).weights_bake, tiles, *lists, counts, drawn, group=1)
-    start = _starts(counts.get())
-    is_drawn = drawn.get().astype(bool)
+    drawn = device.zeros((max(out.saved.lists.pairs, 1),), np.uint8)
+    device.launch(_baking(device, 0).weights_bake, tiles, *_lists(out), counts, drawn, group=1)
+    return _Counts(out, _starts(counts.get()), drawn.get().astype(bool))
+
+
+def _fill(device: Device, counts: _Counts) -> BakedView:
+    out, start = counts.out, counts.start
+    _, tiles = tile_grid(out.camera)
     entries = _Entries(
         device.array(start),
         device.empty((max(int(start[-1]), 1),), np.int32),
         device.empty((max(int(start[-1]), 1), 4)),
     )
-    pair_rows = device.array(_starts(is_drawn)[:-1])
+    pair_rows = device.array(_starts(counts.is_drawn)[:-1])
     device.launch(
-        _baking(device, 1).weights_bake, tiles, *lists, entries.start, pair_rows, entries.rows,
-        entries.weights, group=1,
+        _baking(device, 1).weights_bake, tiles, *_lists(out), entries.start, pair_rows,
+        entries.rows, entries.weights, group=1,
     )  # fmt: skip
-    rows, visible = _rows(device, out, is_drawn)
-    return BakedView(device, (camera.height, camera.width), visible, entries, rows)
+    rows, visible = _rows(device, out, counts.is_drawn)
+    return BakedView(device, (out.camera.height, out.camera.width), visible, entries, rows)
+
+
+def _lists(out: RasterOutput) -> tuple[object, ...]:
+    """What both baking kernels read of a forward pass: its size and its Gaussians by tile."""
+    columns, _ = tile_grid(out.camera)
+    size = np.array([out.camera.width, out.camera.height], np.int32)
+    return size, columns, out.saved.ranges, out.saved.sorted_ids, out.saved.records
 
 
 def _rows(

@@ -67,15 +67,24 @@ class Device:
 
     def array(self, values: np.ndarray) -> cla.Array:
         """A copy of `values` on the device, C order, dtype kept."""
-        return cla.to_device(self.queue, np.ascontiguousarray(values), allocator=self.pool)
+        return cla.to_device(self.queue, np.ascontiguousarray(values), allocator=self._allocate)
 
     def zeros(self, shape: tuple[int, ...], dtype: Any = np.float32) -> cla.Array:
         """An array of zeros on the device."""
-        return cla.zeros(self.queue, shape, dtype, allocator=self.pool)
+        return cla.zeros(self.queue, shape, dtype, allocator=self._allocate)
 
     def empty(self, shape: tuple[int, ...], dtype: Any = np.float32) -> cla.Array:
         """An array on the device whose contents are undefined."""
-        return cla.empty(self.queue, shape, dtype, allocator=self.pool)
+        return cla.empty(self.queue, shape, dtype, allocator=self._allocate)
+
+    def _allocate(self, size: int) -> Any:
+        try:
+            return self.pool(size)
+        except cl.Error as error:
+            raise DeviceError(
+                f"{self.description} cannot hold an array of {size / 1e9:.2f} GB ({error}); "
+                f"ask for fewer pixels or Gaussians."
+            ) from error
 
     def program(self, name: str, defines: Defines | None = None) -> Kernels:
         """The kernels of `kernels/<name>.cl` with each define passed as -D; built once per set.

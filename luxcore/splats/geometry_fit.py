@@ -8,6 +8,7 @@ import numpy as np
 import pyopencl.array as cla
 
 from luxcore.cameras import Camera
+from luxcore.metrics.image import psnr
 from luxcore.splats.backprojection import backproject, view_directions
 from luxcore.splats.checkpoint import part, prefixed
 from luxcore.splats.density import Edit, Strategy
@@ -26,7 +27,7 @@ from luxcore.splats.rasterizer import (
     RasterOutput,
 )
 from luxcore.splats.rates import Rates
-from luxcore.splats.views import Split, Views, psnr, view_at
+from luxcore.splats.views import Split, Views, view_at
 
 _BLACK = -0.5 / SH_C0
 """The constant coefficient of black. Colours are kept above it after a step, not clamped before."""
@@ -97,11 +98,8 @@ class GeometryFit:
     def measure(self, views: tuple[int, ...]) -> list[float]:
         """PSNR in dB of each of `views`."""
         cameras, targets = self.views.cameras, self.views.targets
-        return [psnr(self.render(cameras[v]).image.get(), targets[v].get()) for v in views]
-
-    def loss_value(self) -> float:
-        """The loss of the last iteration; waits for the device."""
-        return self._loss(self.views.targets[0].shape).value()
+        shown = (np.clip(self.render(cameras[v]).image.get(), 0, 1) for v in views)
+        return [psnr(image, targets[v].get()) for image, v in zip(shown, views, strict=True)]
 
     def ask_for_harmonics(self) -> HarmonicsChoice:
         """Whether the training residuals earn degree 1; if so, it is used from here on."""

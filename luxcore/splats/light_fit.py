@@ -11,7 +11,7 @@ from jaxtyping import Float32
 
 from luxcore.settings.relight import RelightSettings
 from luxcore.splats.backprojection import backproject
-from luxcore.splats.baked import BakedView, bake, padded, padded_zeros
+from luxcore.splats.baked import BakedView, bake_within, padded, padded_zeros
 from luxcore.splats.checkpoint import part, prefixed
 from luxcore.splats.device import Device
 from luxcore.splats.gaussians import Gaussians
@@ -70,10 +70,10 @@ class LightFit:
         # A lamp that was off is in no photo: its scale factor is not to be learnt from them.
         learnt = np.append(np.repeat([True, *on], 3), [True, True])
         self._learnt = device.array(learnt.astype(np.float32))
-        self._one_row = device.zeros((1,), np.uint8) + np.uint8(1)
+        self._one_row = device.array(np.ones(1, np.uint8))
+        self._every_row = device.array(np.ones(self.model.count, np.uint8))
         self._workspaces: dict[tuple[int, ...], _Workspace] = {}
-        self._baked: dict[int, BakedView] = {}
-        self._baked_bytes = 0
+        self._baked: dict[int, BakedView] | None = None
         self._smoothness: SmoothnessLoss | None = None
         self.lights = padded(device, self._initial_lights())
 
@@ -152,7 +152,9 @@ class LightFit:
             baked.gather(work.d_image, d_lights)
             seen = baked.visible
         if self._is_smoothing():
+            # This loss is of all Gaussians, also of those that the view does not see.
             self._neighbors().add_gradient(self.lights, d_lights)
+            seen = self._every_row
         self._move_lights(work, d_lights, seen)
 
     def _compare(self, work: _Workspace, view: int, image: cla.Array) -> None:
@@ -183,12 +185,27 @@ class LightFit:
 
     def _weights(self, view: int) -> BakedView | None:
         """Cached blending weights; None where the memory for them is used up."""
-        if view not in self._baked and self._baked_bytes < self.settings.max_baked_mb * 2**20:
+        if self._baked is None:
+            self._baked = self._bake_views()
+        return self._baked.get(view)
+
+    def _bake_views(self) -> dict[int, BakedView]:
+        """Blending weights of the first training views, as many as the memory cap holds.
+
+        By index and all at once: gradients of baked views are summed in another order, so a choice
+        by which view came first would give other bits after a resumption.
+        """
+        baked: dict[int, BakedView] = {}
+        left = self.settings.max_baked_mb * 2**20
+        for view in self.split.training:
             camera = self.views.cameras[view]
             out = self.rasterizer.forward(camera, *self.model.geometry, self.lights)
-            self._baked[view] = bake(self.device, out)
-            self._baked_bytes += self._baked[view].nbytes
-        return self._baked.get(view)
+            weights = bake_within(self.device, out, left)
+            if weights is None:
+                break
+            baked[view] = weights
+            left -= weights.nbytes
+        return baked
 
     def _initial_lights(self) -> Float32[np.ndarray, "n m3"]:
         """Each Gaussian's mean of the fused images under its blending weights in all views."""

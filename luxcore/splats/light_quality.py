@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float32
 
 from luxcore.light.agx import agx
+from luxcore.metrics.image import psnr
 from luxcore.splats.light_fit import LightFit
 from luxcore.splats.light_views import light_names
-from luxcore.splats.views import psnr
 
 
 class LightQuality:

@@ -34,7 +34,7 @@ from luxcore.splats.relighting import baked_gaussians, render_scene, solo
 from luxcore.splats.scene import Scene, SceneLamp, SceneTone, save_scene
 from luxcore.splats.views import split_views
 
-_VERSION = 2
+_VERSION = 3
 """Raised when the same settings would no longer give the same lights."""
 _THUMBNAIL_SIDE = 160
 

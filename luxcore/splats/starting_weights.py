@@ -37,13 +37,18 @@ def starting_weights(
 def _pooled(
     views: LightViews, training: Sequence[int], exposure: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Every k-th pixel of all views: photo [1, p, 3] and lights [m, 1, p, 3], exposed."""
+    """_PIXELS pixels of all views, the same every time: photo [1, p, 3] and lights [m, 1, p, 3],
+    exposed."""
     total = sum(views.photos[v].size // 3 for v in training)
-    stride = max(1, total // _PIXELS)
+    random = np.random.Generator(np.random.PCG64(0))
     photos, lights = [], []
     for view in training:
-        photos.append(views.photos[view].get().reshape(-1, 3)[::stride])
-        pixels = views.targets[view].get().reshape(-1, len(views.units), 3)[::stride]
+        photo = views.photos[view].get().reshape(-1, 3)
+        # At random: every k-th pixel would be the same few columns of each row.
+        count = min(len(photo), -(-len(photo) * _PIXELS // total))
+        chosen = np.sort(random.choice(len(photo), count, replace=False))
+        photos.append(photo[chosen])
+        pixels = views.targets[view].get().reshape(-1, len(views.units), 3)[chosen]
         lights.append(pixels * (views.units * np.float32(exposure))[:, None])
     photo = agx_inverse(np.concatenate(photos)).astype(np.float32)
     return photo[None], np.moveaxis(np.concatenate(lights), 1, 0)[:, None]

@@ -89,9 +89,3 @@ def load_views(device: Device, frames: Sequence[Frame], max_side: int) -> Views:
     cameras = tuple(fitted_camera(frame.camera, max_side) for frame in frames)
     photos = (read_view(f, c) for f, c in zip(frames, cameras, strict=True))
     return Views(cameras, tuple(device.array(photo) for photo in photos))
-
-
-def psnr(image: Float32[np.ndarray, "h w c"], target: Float32[np.ndarray, "h w c"]) -> float:
-    """Peak signal-to-noise ratio in dB of display images in 0..1; 99 where they are equal."""
-    error = np.square(np.clip(image, 0, 1).astype(np.float64) - target).mean()
-    return float(min(-10 * np.log10(max(error, 1e-12)), 99.0))

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from typing import Any, Protocol, runtime_checkable
 
 from luxcore.errors import InputError
@@ -71,8 +73,14 @@ def _pool(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=die_with_parent,
+        initializer=_begin_worker,
     )
+
+
+def _begin_worker() -> None:
+    die_with_parent()
+    # A Ctrl-C reaches every process of the terminal; the stage itself says that it was stopped.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 class DaskExecutor:
@@ -87,20 +95,20 @@ class DaskExecutor:
         from distributed import Client, LocalCluster
         from distributed import as_completed as dask_as_completed
 
-        cluster = None
-        if self.scheduler is None:
-            cluster = LocalCluster(
-                n_workers=self.workers,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
+        # Whoever takes the outcomes may stop in the middle: the cluster ends all the same.
+        with ExitStack() as stack:
+            address = self.scheduler or stack.enter_context(
+                LocalCluster(
+                    n_workers=self.workers,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                )
             )
-        with Client(self.scheduler or cluster) as client:
+            client = stack.enter_context(Client(address))
             futures = {client.submit(function, *row, pure=False): i for i, row in enumerate(rows)}
             for future in dask_as_completed(list(futures)):
                 yield futures[future], future.exception() or future.result()
-        if cluster is not None:
-            cluster.close()
 
 
 def executor_from_environment() -> Executor:

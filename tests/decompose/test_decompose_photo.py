@@ -12,12 +12,12 @@ from click.testing import CliRunner
 from PIL import Image
 
 from luxcore.cli.decompose import command
-from luxcore.decompose.burning import burning_lamps
 from luxcore.decompose.photo import decompose_photo
 from luxcore.errors import DivergedError, InputError, LuxError
 from luxcore.files.exr import read_exr_image
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
+from luxcore.light.burning import burning_lamps
 from luxcore.models.backends import open_decomposer
 from luxcore.models.interface import BackendSettings, Decomposer, Decomposition
 from tests.models.sketched import sketched_crops, write_tiny_weights

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,8 @@ from luxcore.masks.store import Lamp, load_masks
 from luxcore.models.interface import View
 from luxcore.settings.decompose import DecomposeSettings
 from luxcore.settings.harmonize import HarmonizeSettings
-from luxcore.units import UnitStore
+from luxcore.units import Unit, UnitStore
+from luxcore.units import store as units_store
 from tests.models.sketched import write_sketched_capture, write_tiny_weights
 
 VIEWS = 6
@@ -169,6 +170,81 @@ def test_more_views_than_a_pass_holds_are_refused(room: dict[str, Path]) -> None
         harmonizer.run_pass([view] * 16, [], 0)
 
 
-def test_the_code_of_a_pass_is_part_of_its_key() -> None:
+class KeyFoundError(Exception):
+    """Ends a run once the key of its first pass is known."""
+
+
+KeyOf = Callable[[HarmonizeSettings], str]
+
+
+@pytest.fixture
+def key_of(room: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> KeyOf:
+    """The key of the first pass with given settings; nothing is computed."""
+    found: list[str] = []
+
+    def only_key(units: Sequence[Unit], *_: object, **__: object) -> None:
+        found.append(units[0].key)
+        raise KeyFoundError
+
+    def key(settings: HarmonizeSettings) -> str:
+        folders = (room[name] for name in ("capture", "masks", "splat", "decompose"))
+        with pytest.raises(KeyFoundError):
+            harmonize_capture(*folders, tmp_path / "out", settings, UnitStore(tmp_path / "store"))
+        return found.pop()
+
+    monkeypatch.setattr(stage, "run_units", only_key)
+    return key
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        "luxcore/harmonize/unit.py",
+        "luxcore/models/interface.py",
+        "luxcore/models/backends.py",
+        "luxcore/models/small/heads.py",
+        "luxcore/models/multiview_unet/backend.py",
+        "luxcore/models/diffusion/brackets.py",
+        "luxcore/models/weights/mv.safetensors",
+        "luxcore/decompose/views.py",
+        "luxcore/capture/store.py",
+        "luxcore/masks/store.py",
+        "luxcore/files/exr.py",
+        "luxcore/cameras.py",
+    ],
+)
+def test_a_pass_is_stale_once_its_code_changes(
+    key_of: KeyOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
     project = Path(stage.__file__).resolve().parents[2]
-    assert all((project / path).exists() for path in stage.CODE)
+    assert (project / changed).is_file()
+    copied = tmp_path / "project"
+    for path in stage.CODE:
+        if path.endswith(".py"):
+            write_text(copied / path, "")
+        else:
+            (copied / path).mkdir(parents=True)
+    write_text(copied / changed, "before")
+    monkeypatch.setattr(units_store, "_PROJECT", copied)
+    before = key_of(SETTINGS)
+    assert key_of(SETTINGS) == before
+    write_text(copied / changed, "after")
+    assert key_of(SETTINGS) != before
+
+
+def test_passes_with_other_weights_have_other_keys(
+    room: dict[str, Path], key_of: KeyOf, tmp_path: Path
+) -> None:
+    copied = Path(shutil.copyfile(room["mv"], tmp_path / "copied.safetensors"))
+    weights = [None, "somebody/light", "somebody/light-2", str(copied)]
+    keys = [key_of(SETTINGS.model_copy(update={"weights": name})) for name in weights]
+    assert len(set(keys)) == len(weights)
+    # Local weights are what they hold, not where they lie; other bytes under one name are others.
+    assert key_of(SETTINGS.model_copy(update={"weights": str(room["mv"])})) == keys[-1]
+    copied.write_bytes(b"other")
+    assert key_of(SETTINGS.model_copy(update={"weights": str(copied)})) != keys[-1]
+
+
+def write_text(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)

@@ -144,8 +144,18 @@ def test_command_writes_linear_light(tmp_path):
     arguments = [*map(str, paths), "--times", "1/60,1/15,1/4", "--out", str(out), "--json"]
     result = CliRunner().invoke(command, ["merge", *arguments])
     assert result.exit_code == 0, result.output
-    assert json.loads(result.output)["photos"] == 3
+    counts = json.loads(result.output)
+    assert counts["photos"] == 3
+    assert set(counts) == {"photos", "clipped", "black", "gaps", "unknown", "disagreeing"}
     assert read_exr_image(out).shape == (48, 64, 3)
+
+
+def test_command_tells_of_every_count(tmp_path):
+    paths = save_bracket(tmp_path, TIMES, exif=False)
+    arguments = [*map(str, paths), "--times", "1/60,1/15,1/4", "--out", str(tmp_path / "x.exr")]
+    line = CliRunner().invoke(command, ["merge", *arguments]).output
+    names = ("white in all", "black in all", "between exposures", "not finite", "contradictory")
+    assert all(name in line for name in names), line
 
 
 def test_command_refuses_other_formats_before_it_reads(tmp_path):

@@ -79,6 +79,32 @@ def test_nan_in_all_is_counted():
     assert (merged.radiance == 0).all()
 
 
+@pytest.mark.parametrize("gap_ev", [10.0, 12.0])
+def test_light_between_exposures_far_apart_is_bounded_and_counted(gap_ev):
+    """White in the long exposure, black in the short one: no bracket says how bright it is."""
+    linear = CurveResponse(np.repeat((np.arange(256) / 255.0)[:, None], 3, 1))
+    truth = np.geomspace(1e-2, 1e3, 200)[None, :, None].repeat(3, 2)
+    evs = [0.0, -gap_ev]
+    images = [np.round((truth * 2.0**ev).clip(0, 1) * 255) / 255 for ev in evs]
+    merged = merge_brackets(images, evs, linear)
+    # The bounds: white begins at 1, and the short exposure is black up to half a step of 255.
+    ceiling = 2.0**gap_ev * 0.5 / 255
+    between = ((truth >= 1) & (truth < ceiling)).all(-1)
+    assert merged.gaps == between.sum() > 0
+    assert merged.clipped + merged.black + merged.unknown == (truth < 0.5 / 255).all(-1).sum()
+    assert np.allclose(merged.radiance[between], np.sqrt(ceiling), rtol=0.01)
+
+
+def test_a_gap_in_saturated_agx_is_never_nan():
+    """AgX's inverse of a white that no light gives has negative channels."""
+    white = np.zeros((1, 2, 3))
+    white[..., 0] = 1.0
+    merged = merge_brackets([white, np.zeros((1, 2, 3))], [0.0, -12.0])
+    assert merged.gaps == 2
+    assert np.isfinite(merged.radiance).all()
+    assert (merged.radiance[..., 0] > 0).all()
+
+
 def test_no_gap_between_exposures():
     truth = patch(1.0)
     images = eight_bit(truth, [0.0, 0.0])

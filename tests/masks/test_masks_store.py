@@ -13,7 +13,9 @@ from luxcore.capture import Capture, Points, View, write_capture
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import write_exr
-from luxcore.files.photos import write_png
+from luxcore.files.photos import read_photo, write_png
+from luxcore.light.agx import agx, agx_inverse
+from luxcore.light.burning import burning_lamps
 from luxcore.masks import agreement, find_lamps, load_masks
 from luxcore.masks.references import best_views
 from luxcore.settings.masks import MasksSettings
@@ -83,6 +85,25 @@ def test_the_users_masks_go_first(tmp_path: Path, row_of_cameras) -> None:
     assert masks.lamps[0].references == (2,)
     assert masks.mask(0, 0) is None
     assert np.array_equal(masks.mask(0, 1), dark)
+
+
+@pytest.mark.parametrize(("brighter", "on"), [(2.5, False), (4.0, True)])
+def test_a_drawn_lamp_burns_where_decompose_says_so(
+    tmp_path: Path, row_of_cameras, brighter: float, on: bool
+) -> None:
+    """In linear light: a pale shade of 2.5 times its room is 1.5 times as bright on display."""
+    linear = np.full((240, 320, 3), 0.1, np.float32)
+    mask = np.zeros((240, 320), bool)
+    mask[100:140, 100:140] = True
+    linear[mask] *= brighter
+    points = Points(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))
+    views = [View("0000.png", agx(linear), row_of_cameras[0])]
+    capture = write_capture(tmp_path / "c", "c", views, points, source="test", metric=True)
+    write_png(tmp_path / "d" / "0000_00.png", mask)
+    masks = find_lamps(capture, tmp_path / "m", MasksSettings(), tmp_path / "d")
+    assert masks.lamps[0].on is on
+    photo = agx_inverse(read_photo(capture.frames[0].image_path))
+    assert burning_lamps(photo, mask[None]).tolist() == [on]
 
 
 @pytest.mark.parametrize(

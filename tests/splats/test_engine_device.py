@@ -26,6 +26,11 @@ def test_a_kernel_that_does_not_build_is_named():
         open_device().program("absent")
 
 
+def test_an_array_that_the_device_cannot_hold_is_one_sentence():
+    with pytest.raises(DeviceError, match=r"cannot hold an array of 400000\.00 GB"):
+        open_device().empty((10**14,))
+
+
 def test_constants_reach_kernels_with_all_their_digits():
     assert define_text(1 / 255) == "0.003921568859368563f"
     assert float(np.float32(0.003921568859368563)) == float(np.float32(1 / 255))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from engine_scenes import camera_at_origin, on_device, random_scene, relative, run_engine
 
-from luxcore.splats.baked import bake, padded, padded_zeros
+from luxcore.splats.baked import bake, bake_within, padded, padded_zeros
 from luxcore.splats.device import open_device
 from luxcore.splats.rasterizer import RasterConfig, Rasterizer
 
@@ -51,6 +51,11 @@ def test_baked_weights_are_the_rasterizer(channels):
     halved.render(padded(device, scene.colors.astype(np.float32)), image)
     assert 0 < relative(image.get(), out.image.get()) < 3e-4  # half keeps 11 bits of a weight
     assert halved.nbytes < view.nbytes
+    # The size is known before the view is made.
+    assert bake_within(device, out, view.nbytes - 1) is None
+    within = bake_within(device, out, view.nbytes)
+    assert within is not None
+    assert within.nbytes == view.nbytes
 
 
 def test_baked_view_without_gaussians_is_black():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,17 @@ from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import read_exr, write_exr
 from luxcore.light.agx import agx
+from luxcore.masks.store import load_masks
 from luxcore.settings.relight import RelightSettings
-from luxcore.splats import stage2
-from luxcore.splats.light_views import light_units, read_exposure, toned_photo
+from luxcore.splats import light_fit, stage2
+from luxcore.splats.baked import BakedView, padded
+from luxcore.splats.device import open_device
+from luxcore.splats.light_views import LightViews, light_units, read_exposure, toned_photo
 from luxcore.splats.losses.constants import CLIPPED
 from luxcore.splats.ply import read_ply, write_ply
 from luxcore.splats.scene import load_scene
-from luxcore.splats.stage2 import Stage2Result, fit_lights
+from luxcore.splats.stage2 import Stage2Result, fit_lights, open_light_fit
+from luxcore.splats.starting_weights import starting_weights
 
 SMALL = RelightSettings(
     joint_iterations=20,
@@ -107,18 +112,58 @@ def test_cached_weights_change_nothing(
     assert difference < 2e-3
 
 
+def test_cached_weights_stay_below_their_cap(
+    inputs: tuple[Capture, Path, Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first views that fit, whatever order the steps take them in; one more would not."""
+    made: list[BakedView | None] = []
+    bake_within = light_fit.bake_within
+
+    def recorded(*arguments: Any) -> BakedView | None:
+        made.append(bake_within(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(light_fit, "bake_within", recorded)
+    fit(inputs, tmp_path, SMALL.model_copy(update={"max_baked_mb": 3, "joint_iterations": 0}))
+    cached = [view.nbytes for view in made if view is not None]
+    assert 2 <= len(cached) < 8
+    assert sum(cached) <= 3 * 2**20
+    assert made[-1] is None
+    assert len(made) == len(cached) + 1
+
+
+def test_smoothness_reaches_what_the_view_of_its_step_does_not_see(
+    inputs: tuple[Capture, Path, Path, Path],
+) -> None:
+    """One step with smoothness on one view: every Gaussian moves, as neighbours differ."""
+    capture, splat, fuse, masks = inputs
+    update = {"joint_iterations": 0, "smoothness_every": 1, "max_baked_mb": 100}
+    settings = SMALL.model_copy(update=update)
+    lamps = load_masks(masks).lamps
+    stepped = open_light_fit(capture, splat, fuse, lamps, settings, seed=0)
+    random = np.random.default_rng(0)
+    shape = (stepped.model.count, stepped.views.channels)
+    before = random.uniform(0.2, 0.8, shape).astype(np.float32)
+    stepped.lights = padded(stepped.device, before)
+    stepped.step()
+    moved = (stepped.lights.get() != before).any(axis=1)
+    assert moved.all()
+
+
 class KilledError(Exception):
     """Stands for a kill."""
 
 
-@pytest.mark.parametrize("at", [18, 50])
+@pytest.mark.parametrize(("at", "megabytes"), [(18, 4096), (50, 4096), (50, 3)])
 def test_killed_fit_resumes_to_the_same_bits(
     inputs: tuple[Capture, Path, Path, Path],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     at: int,
+    megabytes: int,
 ) -> None:
-    fit(inputs, tmp_path / "whole")
+    settings = SMALL.model_copy(update={"max_baked_mb": megabytes})
+    fit(inputs, tmp_path / "whole", settings)
     step = stage2.LightFit.step
 
     def dying_step(self: stage2.LightFit) -> None:
@@ -129,9 +174,9 @@ def test_killed_fit_resumes_to_the_same_bits(
     with monkeypatch.context() as patch:
         patch.setattr(stage2.LightFit, "step", dying_step)
         with pytest.raises(KilledError):
-            fit(inputs, tmp_path / "resumed", checkpoint=tmp_path / "checkpoint")
+            fit(inputs, tmp_path / "resumed", settings, tmp_path / "checkpoint")
     assert not (tmp_path / "resumed" / "scene.json").exists()
-    fit(inputs, tmp_path / "resumed", checkpoint=tmp_path / "checkpoint")
+    fit(inputs, tmp_path / "resumed", settings, tmp_path / "checkpoint")
     for name in ("splats.ply", "lights.safetensors", "scene.json", "curve.json", "metrics.json"):
         whole, resumed = (tmp_path / n / name for n in ("whole", "resumed"))
         assert whole.read_bytes() == resumed.read_bytes(), name
@@ -183,6 +228,19 @@ def test_scale_factors_are_reached_from_any_unit(
     write_json(tmp_path / "fuse" / "fuse.json", {"exposure": 1.0})
     fit((capture, splat, tmp_path / "fuse", masks), tmp_path / "scene")
     np.testing.assert_allclose(load_scene(tmp_path / "scene").lamps[0].scale, 30, rtol=0.05)
+
+
+def test_starting_weights_see_every_column() -> None:
+    """21 views of 320x240: every 40th pixel would be 8 of the 320 columns, none of them lit."""
+    device, size = open_device(), (240, 320)
+    ambient, lamp = np.full((*size, 3), 0.2, np.float32), np.zeros((*size, 3), np.float32)
+    lamp[:, 20::40] = 0.1
+    photo = device.array(agx(ambient + 3 * lamp).astype(np.float32))
+    target = device.array(np.concatenate([ambient, lamp], axis=2))
+    views = LightViews((), (target,) * 21, (photo,) * 21, (), np.ones(2, np.float32))
+    weights, again = (starting_weights(views, range(21), [True], 1.0) for _ in range(2))
+    np.testing.assert_allclose(weights[1], 3, rtol=0.01)
+    np.testing.assert_array_equal(weights, again)
 
 
 def test_toned_photo_keeps_what_is_clipped() -> None:

@@ -50,6 +50,30 @@ def test_every_executor_gives_the_bytes_of_the_serial_one(tmp_path, executor):
     assert contents(other.folders) == contents(serial.folders)
 
 
+@pytest.mark.parametrize("broken", [False, True], ids=["stopped", "failed"])
+def test_a_dask_cluster_ends_with_a_run_that_is_left_early(monkeypatch, broken):
+    import distributed
+
+    clusters = []
+
+    class Recorded(distributed.LocalCluster):
+        def __init__(self, **options: object) -> None:
+            super().__init__(**options)
+            clusters.append(self)
+
+    monkeypatch.setattr(distributed, "LocalCluster", Recorded)
+    if broken:
+        monkeypatch.setattr(distributed, "as_completed", lambda _: 1 / 0)
+    outcomes = DaskExecutor(None, 1).run(abs, [(-1,), (-2,)])
+    if broken:
+        with pytest.raises(ZeroDivisionError):
+            next(outcomes)
+    else:
+        assert next(outcomes) in [(0, 1), (1, 2)]
+        outcomes.close()
+    assert [cluster.status for cluster in clusters] == [distributed.Status.closed]
+
+
 def test_finished_units_are_taken_and_a_flipped_bit_costs_one(tmp_path):
     store, units = UnitStore(tmp_path), units_of("draw", range(5))
     first = run_units(units, store)
