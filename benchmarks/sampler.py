@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import time
 
 import numpy as np
@@ -24,6 +25,12 @@ def crops_per_second(layers: int, side: int = 128, rows: int = 256) -> float:
     return CROPS / (time.process_time() - started)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Prints one line for each number of channels."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     for layers in (3, 12, 24):
         print(f"{layers:3d} channels: {crops_per_second(layers):6.0f} crops of 128x128 per second")
+
+
+if __name__ == "__main__":
+    main()

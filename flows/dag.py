@@ -16,6 +16,12 @@ SMALL_MODEL = (
 )
 """The default backend. The paper's own backends are no part of what the embedded run depends on."""
 
+CAPTURES = ("luxcore/capture", "luxcore/light")
+"""Reading photos with poses; `luxcore.capture` as a whole is loaded for it, AgX with it."""
+
+SCORE = "luxcore/metrics/image.py"
+"""PSNR, of which a stage's metrics and curves are made."""
+
 COMMON_CODE = ("luxcore/files", "luxcore/units", "luxcore/cameras.py", "tasks/context.py")
 """Code that every stage runs; a change of it makes every stage stale."""
 
@@ -35,7 +41,6 @@ class Stage:
     """Sections of `params.yaml` beside the stage's own and the seed."""
     retries: int = 1
     """How often Prefect tries again after a failure: units already done are kept."""
-    timeout_s: int = 6 * 3600
 
     @property
     def folder(self) -> str:
@@ -47,18 +52,35 @@ class Stage:
         """Flat metrics of the stage, declared to DVC."""
         return metrics_file(self.name)
 
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """Sections of `params.yaml` that the stage reads, beside the seed."""
+        return (self.name, *self.settings)
+
+    @property
+    def watched_code(self) -> tuple[str, ...]:
+        """Every file and folder of code whose change makes the stage stale."""
+        settings = (f"luxcore/settings/{section}.py" for section in self.sections)
+        return (f"tasks/{self.name}.py", *settings, *self.code, *COMMON_CODE)
+
 
 STAGES: tuple[Stage, ...] = (
     Stage(
         "rooms",
         "procedural rooms with lamps, from seeds alone",
-        code=("luxcore/rooms",),
+        code=("luxcore/rooms", "luxcore/light/blackbody.py"),
     ),
     Stage(
         "render",
         "every lamp of every room by one light-group render a view",
         needs=("rooms",),
-        code=("luxcore/render", "luxcore/rooms", "luxcore/data", "luxcore/light"),
+        code=(
+            "luxcore/render",
+            "luxcore/rooms",
+            "luxcore/data",
+            "luxcore/light",
+            "luxcore/statistics/contact_sheet.py",
+        ),
     ),
     Stage(
         "train_sv",
@@ -82,44 +104,62 @@ STAGES: tuple[Stage, ...] = (
         "splat",
         "stage 1: geometry as Gaussians, in the light the photos were taken in",
         needs=("capture",),
-        code=("luxcore/splats", "kernels"),
+        code=("luxcore/splats", "kernels", *CAPTURES, SCORE),
     ),
     Stage(
         "masks",
         "which pixels are which lamp",
         needs=("capture",),
-        code=("luxcore/masks", "luxcore/light"),
+        code=("luxcore/masks", *CAPTURES),
     ),
     Stage(
         "decompose",
         "reference views into ambient and one image per lamp",
         needs=("capture", "masks", "splat", "train_sv"),
-        code=("luxcore/decompose", *SMALL_MODEL, "luxcore/light"),
+        code=("luxcore/decompose", *SMALL_MODEL, *CAPTURES, "luxcore/masks", SCORE),
     ),
     Stage(
         "harmonize",
         "the decomposition carried to every view, in chained passes of at most 15",
         needs=("capture", "masks", "splat", "decompose", "train_mv"),
-        code=("luxcore/harmonize", *SMALL_MODEL, "luxcore/light"),
+        code=(
+            "luxcore/harmonize",
+            "luxcore/decompose",
+            *SMALL_MODEL,
+            *CAPTURES,
+            "luxcore/masks",
+            SCORE,
+        ),
     ),
     Stage(
         "fuse",
         "three exposures per lamp and view merged to linear HDR",
         needs=("capture", "harmonize"),
-        code=("luxcore/light", "luxcore/capture"),
+        code=CAPTURES,
     ),
     Stage(
         "relight",
         "stage 2: HDR coefficients per lamp on every Gaussian",
         needs=("capture", "masks", "splat", "fuse"),
-        code=("luxcore/splats", "kernels", "luxcore/light"),
+        code=("luxcore/splats", "kernels", *CAPTURES, "luxcore/masks", SCORE),
     ),
     Stage(
         "evaluate",
         "the tables: decomposition, harmonization and relighting against truth",
         needs=("render", "capture", "masks", "train_sv", "train_mv", "fuse", "relight"),
-        code=("luxcore/evaluate", "luxcore/metrics", *SMALL_MODEL, "luxcore/splats", "kernels"),
-        settings=("splat",),
+        code=(
+            "luxcore/evaluate",
+            "luxcore/metrics",
+            *SMALL_MODEL,
+            "luxcore/splats",
+            "kernels",
+            *CAPTURES,
+            "luxcore/masks",
+            "luxcore/data",
+            "luxcore/decompose",
+            "luxcore/harmonize",
+        ),
+        settings=("splat", "relight"),
     ),
     Stage(
         "report",
@@ -138,7 +178,14 @@ STAGES: tuple[Stage, ...] = (
             "relight",
             "evaluate",
         ),
-        code=("luxcore/report", "luxcore/explorer", "luxcore/light", "luxcore/evaluate/table.py"),
+        code=(
+            "luxcore/report",
+            "luxcore/explorer",
+            "luxcore/light",
+            "luxcore/metrics",
+            "luxcore/evaluate/answers.py",
+            "luxcore/evaluate/table.py",
+        ),
     ),
 )
 
@@ -155,12 +202,3 @@ def upstream(names: Iterable[str]) -> set[str]:
     """Names of all stages that `names` depend on, directly or not."""
     needed = {need for name in names for need in BY_NAME[name].needs}
     return needed | upstream(needed) if needed else set()
-
-
-def downstream(name: str) -> set[str]:
-    """Names of all stages that depend on `name`, directly or not."""
-    found: set[str] = set()
-    for stage in ordered():
-        if name in stage.needs or found & set(stage.needs):
-            found.add(stage.name)
-    return found

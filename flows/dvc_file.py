@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import click
 import yaml
 
-from flows.dag import BY_NAME, COMMON_CODE, STAGES, Stage
+from flows.dag import BY_NAME, STAGES, Stage
 from flows.plots import PLOTS
 
 HEADER = "# Generated from flows/dag.py by `python -m flows.dvc_file`; edit that file instead.\n"
@@ -24,19 +25,24 @@ def render_dvc_yaml() -> str:
 
 
 def _stage_entry(stage: Stage) -> dict[str, Any]:
-    code = (f"tasks/{stage.name}.py", f"luxcore/settings/{stage.name}.py")
     inputs = [BY_NAME[name].folder for name in stage.needs]
     return {
         "desc": stage.does,
         # exec: dash would stay between dvc and the stage, which then would outlive a stopped dvc.
         "cmd": f"exec python -m tasks {stage.name}",
-        "deps": sorted({*code, *stage.code, *COMMON_CODE, *inputs}),
-        "params": sorted({"seed", stage.name, *stage.settings}),
+        "deps": sorted({*stage.watched_code, *inputs}),
+        "params": sorted({"seed", *stage.sections}),
         "outs": [stage.folder],
         "metrics": [stage.metrics_file],
     }
 
 
-if __name__ == "__main__":
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Write dvc.yaml anew from the DAG."""
     DVC_FILE.write_text(render_dvc_yaml(), encoding="utf-8")
-    print(f"wrote {DVC_FILE.name} with {len(STAGES)} stages")
+    click.echo(f"wrote {DVC_FILE.name} with {len(STAGES)} stages")
+
+
+if __name__ == "__main__":
+    main()

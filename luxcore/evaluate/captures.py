@@ -10,11 +10,11 @@ import torch
 import torch.nn.functional as fn
 
 from luxcore.capture import Capture, load_capture
-from luxcore.capture.store import read_object
 from luxcore.data.crops import LitCrop
 from luxcore.decompose.views import view_masks
 from luxcore.errors import FormatError, LuxError
 from luxcore.files.exr import read_exr
+from luxcore.files.json_object import read_object
 from luxcore.harmonize.poses import pose_distance
 from luxcore.masks.store import LampMasks, load_masks
 from luxcore.models.small.surfaces import pinhole_of, pinhole_rays

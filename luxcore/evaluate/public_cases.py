@@ -7,7 +7,6 @@ panoramas with those cameras, so that no perspective copy of the test scenes is 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from luxcore.data.public_reader import PublicScene
 from luxcore.errors import FormatError, InputError
 from luxcore.evaluate.cases import LampCase
 from luxcore.files.input import check_input_file
+from luxcore.files.json_object import read_object
 from luxcore.progress import progress
 
 REFERENCE_VIEW = 0
@@ -218,10 +218,4 @@ def _read(path: Path) -> dict[str, Any]:
     check_input_file(path)
     if path.stat().st_size > MAX_BYTES:
         raise FormatError(f"{path} is too large for a list.")
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"{path} is not JSON: {error}.") from error
-    if not isinstance(about, dict):
-        raise FormatError(f"{path} is not a JSON object.")
-    return about
+    return read_object(path)

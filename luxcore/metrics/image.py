@@ -13,8 +13,9 @@ Image = Float[np.ndarray, "h w 3"]
 
 def psnr(predicted: Float[np.ndarray, "*places c"], truth: Float[np.ndarray, "*places c"]) -> float:
     """Peak signal to noise ratio in dB for a peak of 1; at most 100."""
-    error = np.asarray(predicted, np.float64) - np.asarray(truth, np.float64)
-    mean_square = float(np.mean(error**2))
+    # One array in double precision: three would be a gigabyte for a photo of 12 megapixels.
+    error = np.subtract(predicted, truth, dtype=np.float64)
+    mean_square = float(np.mean(np.square(error, out=error)))
     if mean_square == 0.0:
         return PSNR_CAP_DB
     return min(PSNR_CAP_DB, -10.0 * float(np.log10(mean_square)))

@@ -8,11 +8,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 from jaxtyping import Float
 
 from luxcore.cameras import Camera
 from luxcore.cli.camera_file import read_camera
+from luxcore.errors import LuxError
 from luxcore.files.photos import write_png
 from luxcore.light.agx import agx
 from luxcore.splats.light_views import AMBIENT
@@ -55,7 +57,18 @@ def _joined(pictures: list[Image]) -> Image:
     return np.concatenate(pictures, axis=1)
 
 
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--view", default=0, show_default=True, help="Which camera of the scene.")
+def main(scene: Path, out: Path, view: int) -> None:
+    """Write the picture of the relightable scene in folder SCENE to OUT (PNG)."""
+    try:
+        write_png(out, banner(load_scene(scene), read_camera(scene / "transforms.json", view)))
+    except (LuxError, OSError) as error:
+        click.echo(f"lux: {error}", err=True)
+        sys.exit(1)
+
+
 if __name__ == "__main__":
-    folder, out = Path(sys.argv[1]), Path(sys.argv[2])
-    number = int(sys.argv[3]) if len(sys.argv) > 3 else 0
-    write_png(out, banner(load_scene(folder), read_camera(folder / "transforms.json", number)))
+    main()

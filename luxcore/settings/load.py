@@ -18,12 +18,23 @@ MAX_BYTES = 1_000_000
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Safe YAML without aliases: an alias bomb is a mistake, never a parameter."""
+    """Safe YAML without aliases and double keys: both are mistakes, never parameters."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
             raise yaml.YAMLError("aliases (*name) are not allowed")
         return super().compose_node(parent, index)
+
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value in seen:
+                # PyYAML would take the last of them, DVC refuses the file.
+                problem = f"the key {key.value} is given twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            seen.add(str(key.value))
+        return node
 
 
 def load_settings(path: Path) -> ProjectSettings:
@@ -34,18 +45,28 @@ def load_settings(path: Path) -> ProjectSettings:
 def read_yaml(path: Path) -> Any:
     """Plain data of a small YAML file. Raises InputError."""
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a file.")
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     if path.stat().st_size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES} bytes, too large for parameters.")
     try:
         return yaml.load(path.read_text(encoding="utf-8"), Loader=_PlainLoader)
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not text in UTF-8.") from error
+    except yaml.MarkedYAMLError as error:
+        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
+        raise InputError(f"{path} is not plain YAML: {line}{error.problem}.") from error
+    # ValueError: a number of thousands of digits, a date such as 2024-99-99.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is not plain YAML: {' '.join(str(error).split())}.") from error
 
 
 def parse_settings(data: Any, source: str) -> ProjectSettings:
     """Validate parsed YAML; `source` is named in errors."""
+    if data is None:
+        raise InputError(f"{source} must hold sections, it is empty.")
     if not isinstance(data, dict):
         raise InputError(f"{source} must hold sections, got {type(data).__name__}.")
     try:

@@ -90,7 +90,7 @@ class DataSettings(Settings):
     """Where training examples come from and how they are framed."""
 
     root: str = ""
-    """Folder of rendered rooms, in the compact form or in the public layout."""
+    """Folder of rendered rooms, in the compact form or in the public layout (scenes or shards)."""
 
     side: int = Field(512, ge=64, le=2048, multiple_of=64)
     """Width and height of a sampled perspective view, pixels."""

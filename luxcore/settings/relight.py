@@ -31,7 +31,7 @@ class RelightSettings(Settings):
     )
     neighbors: int = Field(8, ge=1, le=64, description="K of the smoothness term")
     light_rate: float = Field(
-        0.01, gt=0, le=1, description="step of radiance, in units of a light's own mean"
+        0.01, gt=0, le=1, description="step of radiance, in units of twice a light's mean"
     )
     weight_rate: float = Field(
         0.001, ge=0, le=1, description="step of the lamps' scale factors and of the tone curve"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import textwrap
 
+import click
 from pydantic.fields import FieldInfo
 
 from luxcore.settings.base import Settings
@@ -52,5 +53,11 @@ def _first_line(section: type) -> str:
     return (section.__doc__ or "").strip().splitlines()[0]
 
 
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Print params.yaml with every knob at its default."""
+    click.echo(default_yaml(), nl=False)
+
+
 if __name__ == "__main__":
-    print(default_yaml(), end="")
+    main()

@@ -35,11 +35,6 @@ class Lighting:
     exposure_ev: float = 0.0
     tone: Tone = "AgX"
 
-    def with_row(self, index: int, row: Row) -> Lighting:
-        """A copy in which one row is another."""
-        rows = (*self.rows[:index], row, *self.rows[index + 1 :])
-        return Lighting(rows, self.solo, self.exposure_ev, self.tone)
-
     def lit(self, index: int) -> bool:
         """Whether a row gives light."""
         return self.rows[index].on if self.solo is None else self.solo == index

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from luxcore.errors import InputError
-from luxcore.files.atomic import write_json
 from luxcore.splats.scene import Scene
 from luxcore.viewer.lighting import (
     MAX_STOPS,
@@ -38,13 +36,11 @@ class _Preset(BaseModel):
     lights: dict[str, _Row]
 
 
-def save_preset(path: Path, scene: Scene, lighting: Lighting) -> None:
-    """Write the lighting; linear RGB colours, stops relative to the photos."""
-    write_json(path, preset_value(scene, lighting))
-
-
 def preset_value(scene: Scene, lighting: Lighting) -> dict:
-    """The preset as a JSON value. A solo row is stored as what it shows: the others off."""
+    """The preset as a JSON value: linear RGB colours, stops relative to the photos.
+
+    A solo row is stored as what it shows: the others off.
+    """
     lights = {
         name: {
             "on": lighting.lit(i),

@@ -26,7 +26,7 @@ def run_kontext(tmp_path: Path, text: str) -> int:
     ("text", "fact"),
     [
         ("{}", "needs rendered rooms"),
-        ("data: {root: nowhere}", "holds no rendered views"),
+        ("data: {root: nowhere}", "nowhere does not exist"),
         ("data: {root: ROOMS}", "needs a base"),
         ("{data: {root: ROOMS}, model: {base: nobody/nothing}}", "nobody/nothing"),
         ("model: {variant: unknown}", "model.variant"),
@@ -55,7 +55,7 @@ def test_the_multiview_command_says_the_same(
     settings.write_text(f"data: {{root: {tmp_path / 'none'}}}\n")
     arguments = ["--settings", str(settings), "--out", str(tmp_path / "out")]
     assert train_command("t", MultiViewTraining, train_multiview, arguments) == 2
-    assert "holds no rendered views" in capsys.readouterr().err
+    assert "none does not exist" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -41,6 +41,8 @@ def test_seed_zero_is_legal():
         "seed: [1",
         "- just\n- a list",
         "1: {}",
+        "seed: " + 5000 * "9",
+        "seed: 2024-99-99",
     ],
 )
 def test_hostile_yaml_is_refused(tmp_path, text):
@@ -50,9 +52,31 @@ def test_hostile_yaml_is_refused(tmp_path, text):
         load_settings(path)
 
 
+@pytest.mark.parametrize(
+    ("content", "fact"),
+    [
+        (b"", "it is empty"),
+        (b"seed: \xff", "is not text in UTF-8"),
+        (b"seed: 1\nrender: [2", "is not plain YAML: line 2: "),
+        (b"seed: 1\nseed: 2", "line 2: the key seed is given twice"),
+        (b"render:\n  spp: 1\n  spp: 2", "line 3: the key spp is given twice"),
+    ],
+)
+def test_a_damaged_file_is_one_line_that_names_the_fact(tmp_path, content, fact):
+    path = tmp_path / "params.yaml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        load_settings(path)
+    assert str(caught.value).startswith(f"{path} ")
+    assert fact in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_missing_and_huge_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="does not exist"):
         load_settings(tmp_path / "params.yaml")
+    with pytest.raises(InputError, match="is a folder"):
+        load_settings(tmp_path)
     (tmp_path / "huge.yaml").write_text("#" * 2_000_000)
     with pytest.raises(InputError, match="larger than"):
         load_settings(tmp_path / "huge.yaml")

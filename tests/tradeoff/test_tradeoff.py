@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -222,6 +223,43 @@ def test_a_sweep_of_another_version_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "t.json").write_text("{}")
     with pytest.raises(FormatError, match="does not hold sweeps"):
         load_measured(tmp_path / "t.json")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "fact"),
+    [
+        (["default"], "nope", "not whole: iterations"),
+        (["points"], [], "not whole: iterations"),
+        (["points", 0, "works"], [], "not whole: iterations"),
+        (["points", 0, "works", 0, "error"], float("nan"), "not whole: iterations"),
+        (["points", 0, "works", 0, "cpu_s"], "soon", "sweeps.0.points.0.works.0.cpu_s"),
+        (["points", 0, "settings"], [1], "sweeps.0.points.0.settings"),
+        (["points", 0, "works", 0], {}, "cpu_s: field required"),
+    ],
+)
+def test_a_damaged_sweep_is_one_line_before_anything_is_measured(
+    tmp_path: Path, path: list[str | int], value: object, fact: str
+) -> None:
+    file = tmp_path / "tradeoff.json"
+    save_measured(file, Measured(ABOUT, (KNEE,)))
+    document = json.loads(file.read_text())
+    place = document["sweeps"][0]
+    for step in path[:-1]:
+        place = place[step]
+    place[path[-1]] = value
+    file.write_text(json.dumps(document))
+    for options in (["--quality", "high"], ["--knob", "alpha", "--artifacts", "nowhere"]):
+        refused = CliRunner().invoke(command, ["--out", str(tmp_path), *options])
+        assert isinstance(refused.exception, FormatError)
+        assert fact in str(refused.exception)
+        assert "\n" not in str(refused.exception)
+
+
+def test_bytes_that_are_no_text_are_not_repeated_to_the_user(tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_bytes(bytes(range(256)))
+    with pytest.raises(FormatError, match="does not hold sweeps") as caught:
+        load_measured(tmp_path / "t.json")
+    assert len(str(caught.value)) < 300
 
 
 def test_the_command_chooses_and_says_what_to_expect(tmp_path: Path) -> None:

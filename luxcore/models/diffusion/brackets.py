@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from luxcore.data.lighting import BRACKETS_EV
 from luxcore.light.agx import agx
+from luxcore.light.exposure import BRACKETS_EV
 from luxcore.light.hdr import merge_brackets
 
 LIT_PERCENTILE = 90.0

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from luxcore.data.compact import list_rendered
+from luxcore.data.compact import holds_compact, list_rendered
 from luxcore.data.crops import LitCrop
 from luxcore.data.multiview import MultiViewSets
+from luxcore.data.public_reader import public_views
+from luxcore.data.store import AnyView
 from luxcore.data.training import SingleViewSamples
 from luxcore.errors import InputError
 from luxcore.settings.paper_models import DataSettings
@@ -62,7 +64,9 @@ def set_with_lamp(sets: LitSets, position: int, views: int) -> list[LitCrop]:
     raise InputError(f"none of {ATTEMPTS} sets of training photos shows a lamp.")
 
 
-def _views(settings: DataSettings) -> Sequence[Path]:
+def _views(settings: DataSettings) -> Sequence[AnyView]:
+    """Views of either layout; shards are read where they lie."""
     if not settings.root:
         raise InputError("training needs rendered rooms: set data.root to their folder.")
-    return list_rendered(Path(settings.root).expanduser())
+    root = Path(settings.root).expanduser()
+    return list_rendered(root) if holds_compact(root) else public_views(root)

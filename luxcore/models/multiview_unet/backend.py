@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from luxcore.data.lighting import BRACKETS_EV
 from luxcore.errors import InputError
 from luxcore.light.agx import agx, agx_inverse
+from luxcore.light.exposure import BRACKETS_EV
 from luxcore.light.scale_factors import solve
 from luxcore.models.diffusion.brackets import merged_light, olat_exposure, olat_picture
 from luxcore.models.diffusion.device import pick_device

@@ -12,8 +12,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from luxcore.data.crops import LitCrop
-from luxcore.data.lighting import BRACKETS_EV, one_light_off
+from luxcore.data.lighting import one_light_off
 from luxcore.light.agx import agx
+from luxcore.light.exposure import BRACKETS_EV
 from luxcore.models.diffusion.brackets import olat_exposure, olat_picture
 from luxcore.models.diffusion.frames import to_tensor
 from luxcore.models.diffusion.randomness import numpy_generator

@@ -10,14 +10,15 @@ from luxcore.capture import load_capture
 from luxcore.errors import InputError
 from luxcore.evaluate.captures import true_view
 from luxcore.light.agx import agx
+from luxcore.light.exposure import BRACKETS_EV
 from luxcore.light.hdr import merge_brackets
 from luxcore.masks.store import load_masks
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
 
-BRACKETS_EV = {
+MERGED_EV = {
     "EV 0": (0.0,),
     "EV 0, −4": (0.0, -4.0),
-    "EV 0, −2, −4": (0.0, -2.0, -4.0),
+    "EV 0, −2, −4": BRACKETS_EV,
     "EV 0, −1, −2, −3, −4": (0.0, -1.0, -2.0, -3.0, -4.0),
 }
 VIEWS = 3
@@ -42,7 +43,7 @@ def _prepare(bench: Bench) -> list[_Light]:
 
 
 def _run(lights: list[_Light], choice: Choice, repeat: int) -> Work:
-    stops = BRACKETS_EV[choice.label]
+    stops = MERGED_EV[choice.label]
     errors = []
     with stopwatch() as watch:
         merged = []
@@ -60,7 +61,7 @@ def _run(lights: list[_Light], choice: Choice, repeat: int) -> Work:
 BRACKETS = Knob(
     name="exposures merged for each lamp",
     work="a lamp's exposures merged",
-    choices=tuple(Choice(label, {}) for label in BRACKETS_EV),
+    choices=tuple(Choice(label, {}) for label in MERGED_EV),
     error="mean error, share of the lamp's light",
     why="One exposure loses the lamp itself; three hold it, as in the paper, and five cost half as "
     "much again for a fifth less error.",

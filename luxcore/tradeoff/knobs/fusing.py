@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from luxcore.files.exr import read_exr
-from luxcore.light.fuse import merge_files
+from luxcore.light.fuse import bracket_paths, merge_files
 from luxcore.tradeoff.knob import Bench, Choice, Knob, Work, stopwatch
 from luxcore.tradeoff.knobs.models import ERROR, Truth
 
 VIEWS = 4
-STOPS = (0, 2, 4)
 
 
 @dataclass(frozen=True)
@@ -35,9 +34,7 @@ def _run(prepared: _Prepared, choice: Choice, repeat: int) -> Work:
             lights = {}
             for name, linear in direct.items():
                 if choice.settings["fuse.method"] == "debevec":
-                    light = f"{view:04d}_{name.removeprefix('light_')}"
-                    brackets = prepared.folder / "brackets"
-                    paths = {stops: brackets / f"{light}_ev{stops}.png" for stops in STOPS}
+                    paths = bracket_paths(prepared.folder, view, name)
                     linear = merge_files(paths, exposure).radiance
                 lights[name] = linear
             found.append((view, lights))
