@@ -17,7 +17,6 @@ from luxcore.errors import InputError
 from luxcore.files.digests import tree_digest
 from luxcore.harmonize.stage import CODE as HARMONIZE_CODE
 from luxcore.harmonize.stage import harmonize_capture
-from luxcore.light.fuse import CODE as FUSE_CODE
 from luxcore.light.fuse import fuse_capture
 from luxcore.masks import find_lamps
 from luxcore.settings.base import Settings
@@ -28,15 +27,8 @@ from luxcore.units import UnitStore, unit_key
 
 Log = Callable[[str], None]
 
-_CODE = {
-    "capture": ("luxcore/capture", "luxcore/files"),
-    "masks": ("luxcore/masks", "luxcore/light"),
-    "splat": ("luxcore/splats", "kernels"),
-    "decompose": ("luxcore/decompose", "luxcore/models", "luxcore/light"),
-    "harmonize": HARMONIZE_CODE,
-    "fuse": FUSE_CODE,
-    "relight": ("luxcore/splats", "kernels", "luxcore/light"),
-}
+_CODE = (*HARMONIZE_CODE, "luxcore/splats", "luxcore/metrics", "kernels")
+"""All that any step runs. One list, since every step reads through most of it."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,7 @@ class _Work:
         arguments = {"stage": stage, "seed": self.settings.seed, "name": self.name}
         arguments["settings"] = section.model_dump(mode="json")
         digests = [tree_digest([folder], folder) for folder in inputs]
-        key = unit_key(_CODE[stage], arguments, digests)
+        key = unit_key(_CODE, arguments, digests)
         folder = self.store.get(key)
         if folder is None:
             folder = self.store.put(key, lambda out: _into(out / self.name, compute))
