@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
 
 import click
@@ -17,11 +18,17 @@ def run(stages: tuple[str, ...], stages_at_once: int) -> None:
     """Run the flow: every stage that is stale, in order; all of them or only STAGES."""
     root = project_root()
     _check_names(stages)
-    from flows.prefect_settings import use_prefect_of
-
-    use_prefect_of(root)
-    from flows.pipeline import run_pipeline
+    from flows.checks import check_project
+    from flows.own_server import start_own_server
+    from flows.records import check_records
     from flows.summary import metrics_table
+
+    check_project(root)
+    check_records(root)
+    # A termination would leave stages and their times unrecorded; it is taken as an interrupt.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    start_own_server(root)
+    from flows.pipeline import run_pipeline
 
     run_pipeline(root, list(stages) or None, stages_at_once)
     click.echo(metrics_table(root))
@@ -95,8 +102,10 @@ def schedule(
     """
     root = project_root()
     _check_names(stages)
+    from flows.records import check_records
     from flows.schedule import serve
 
+    check_records(root)
     serve(root, cron, list(stages) or None, worktree, list(changes))
 
 
@@ -112,7 +121,9 @@ def dashboards(mlflow_port: int, prefect_port: int, report_port: int) -> None:
     root = project_root()
     from flows.dashboards import dashboards as servers
     from flows.dashboards import serve_dashboards
+    from flows.records import check_records
 
+    check_records(root)
     serve_dashboards(root, servers(root, mlflow_port, prefect_port, report_port), click.echo)
 
 
@@ -120,7 +131,7 @@ def project_root() -> Path:
     """The folder above (or at) the current one that holds `params.yaml` and `dvc.yaml`."""
     here = Path.cwd()
     for folder in (here, *here.parents):
-        if (folder / "dvc.yaml").is_file() and (folder / "params.yaml").is_file():
+        if (folder / "dvc.yaml").exists() and (folder / "params.yaml").exists():
             return folder
     raise InputError(f"{here} is not inside a project: no dvc.yaml with a params.yaml beside it.")
 

@@ -22,7 +22,7 @@ from flows.servers import (
     started,
     wait_until_up,
 )
-from luxcore.errors import LuxError
+from luxcore.errors import InputError, LuxError
 from luxcore.ports import check_port
 
 MLFLOW_PORT, PREFECT_PORT, REPORT_PORT = 5000, 4200, 4300
@@ -44,10 +44,14 @@ def dashboards(
 def serve_dashboards(root: Path, pages: tuple[Server, ...], say: Callable[[str], None]) -> None:
     """Start all, say their addresses, and wait until one ends or the user interrupts.
 
-    Raises InputError when a port is in use, LuxError when a server does not start or ends.
+    Raises InputError when a port is in use or given twice, LuxError when a server does not start
+    or ends.
     """
-    for page in pages:
+    for number, page in enumerate(pages):
         check_port(HOST, page.port)
+        for other in pages[:number]:
+            if other.port == page.port:
+                raise InputError(f"port {page.port} is asked for by {other.name} and {page.name}.")
     # Unlike an interrupt, a termination would leave the servers behind.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:

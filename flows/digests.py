@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flows.dag import STAGES
+from luxcore.errors import FormatError
 from luxcore.files.digests import array_digest, file_digest
 from luxcore.units.store import MANIFEST
 
@@ -16,7 +17,10 @@ SKIPPED = frozenset({"report"})
 
 
 def stage_digests(root: Path) -> dict[str, str]:
-    """Stage name → sha256 over the names and contents of its artifacts."""
+    """Stage name → sha256 over the names and contents of its artifacts.
+
+    Raises FormatError naming a picture that cannot be read.
+    """
     present = [s for s in STAGES if s.name not in SKIPPED and (root / s.folder).is_dir()]
     return {stage.name: _folder_digest(root / stage.folder) for stage in present}
 
@@ -38,6 +42,9 @@ def _content_digest(file: Path) -> str:
     if file.suffix == ".png":
         from PIL import Image
 
-        with Image.open(file) as image:
-            return array_digest(np.asarray(image))
+        try:
+            with Image.open(file) as image:
+                return array_digest(np.asarray(image))
+        except (OSError, ValueError, SyntaxError) as error:
+            raise FormatError(f"{file} is not a readable PNG: {error}.") from error
     return file_digest(file)

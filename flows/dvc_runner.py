@@ -8,13 +8,15 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from luxcore.errors import LuxError
+from flows.checks import LOCK_COPY, locked_stages, stages_of
+from luxcore.errors import InputError, LuxError
+from luxcore.files.atomic import atomic_file
 from luxcore.lifetime import die_with_parent
 
 NEVER_RUN = "it has not run here yet"
@@ -35,7 +37,8 @@ def stale_stages(root: Path) -> dict[str, list[str]]:
     if BUSY in done.stderr:
         raise LuxError(f"another run is at work in {root}; wait for it to end.")
     if done.returncode != 0:
-        raise LuxError(f"dvc status failed: {_last_line(done.stderr)}")
+        # Of a damaged YAML file it says which in the first line; where in the file is on others.
+        raise LuxError(f"dvc status failed: {_dvc_error(done.stderr, otherwise=0)}")
     status = json.loads(done.stdout or "{}")
     known = locked_stages(root)
     return {name: stale_reasons(known, name, entries) for name, entries in status.items()}
@@ -45,19 +48,11 @@ def stale_reasons(known: set[str], name: str, entries: list[Any]) -> list[str]:
     """DVC's status of one stage (nested names and states) as phrases for people.
 
     To DVC everything is modified about a stage that is not among the `known` ones of
-    `locked_stages`; to people it is new.
+    `dvc.lock`; to people it is new.
     """
     if entries and name not in known:
         return [NEVER_RUN]
     return [phrase for entry in entries for phrase in _entry_phrases(entry)]
-
-
-def locked_stages(root: Path) -> set[str]:
-    """Stages that `dvc.lock` has a result of."""
-    lock = root / "dvc.lock"
-    if not lock.is_file():
-        return set()
-    return set((yaml.safe_load(lock.read_text()) or {}).get("stages", {}))
 
 
 def reproduce(root: Path, stage: str) -> str:
@@ -68,7 +63,7 @@ def reproduce(root: Path, stage: str) -> str:
     """
     keep_lock_copy(root)
     command = [*_DVC, "--wait-for-lock", "repro", "--single-item", stage]
-    while True:
+    while not _stopping.is_set():
         process = subprocess.Popen(
             command,
             cwd=root,
@@ -78,25 +73,65 @@ def reproduce(root: Path, stage: str) -> str:
             text=True,
             preexec_fn=die_with_parent,
         )
-        tail = _forward(process)
+        with _among_running(process):
+            tail = _forward(process)
         if process.returncode == 0:
             return _outcome(tail)
+        if _stopping.is_set():
+            break
         if BUSY not in tail:
             raise LuxError(f"stage {stage} failed: {_stage_error(tail)}")
         print(f"stage {stage} is being run by another process; waiting.", file=sys.stderr)
-        time.sleep(BUSY_RETRY_S)
+        _stopping.wait(BUSY_RETRY_S)
+    raise LuxError(f"stage {stage} was stopped.")
+
+
+def stop_stages() -> None:
+    """End the stages that run now, and let none begin in this process; finished units are kept.
+
+    The flow's threads wait for them, so that an interrupt would otherwise take hours.
+    """
+    _stopping.set()
+    for process in list(_running):
+        process.terminate()
+
+
+@contextmanager
+def _among_running(process: subprocess.Popen[str]) -> Iterator[None]:
+    _running.add(process)
+    if _stopping.is_set():
+        process.terminate()
+    try:
+        yield
+    finally:
+        _running.discard(process)
 
 
 def keep_lock_copy(root: Path) -> None:
     """DVC rewrites `dvc.lock` in place; the copy in `.lux` repairs it after a power cut."""
     lock = root / "dvc.lock"
-    if lock.is_file() and lock.stat().st_size > 0:
-        backup = root / ".lux" / "dvc.lock.before"
-        backup.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(lock, backup)
+    if not lock.is_file():
+        return
+    # A damaged lock, or one that another stage is rewriting now, leaves the older copy in place.
+    with suppress(InputError), atomic_file(root / LOCK_COPY) as copy:
+        shutil.copyfile(lock, copy)
+        stages_of(copy)
+
+
+@contextmanager
+def said_by_dvc() -> Iterator[None]:
+    """Raise DVC's own failures, which name file and fact in their first line, as LuxError."""
+    from dvc.exceptions import DvcException
+
+    try:
+        yield
+    except DvcException as error:
+        raise LuxError(f"DVC: {_sentence(str(error))}") from error
 
 
 _DVC = [sys.executable, "-m", "dvc"]
+_running: set[subprocess.Popen[str]] = set()
+_stopping = threading.Event()
 
 
 def _dvc(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -133,12 +168,19 @@ def _outcome(tail: str) -> str:
 
 def _stage_error(tail: str) -> str:
     own = [line[5:] for line in tail.splitlines() if line.startswith("lux: ")]
-    return own[-1] if own else _last_line(tail)
+    return own[-1] if own else _dvc_error(tail, otherwise=-1)
 
 
-def _last_line(text: str) -> str:
-    lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1] if lines else "no message."
+def _dvc_error(text: str, otherwise: int) -> str:
+    """The last line that DVC marks as an error, or else the line of this number."""
+    lines = [line for line in text.splitlines() if line.strip()] or ["no message"]
+    marked = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    return _sentence(marked[-1] if marked else lines[otherwise])
+
+
+def _sentence(text: str) -> str:
+    first = text.strip().splitlines()[0].strip()
+    return f"{first.rstrip('.:')}."
 
 
 def _entry_phrases(entry: Any) -> list[str]:

@@ -101,13 +101,14 @@ def _mark_in_prefect(run_id: str) -> str | None:
 
 
 def _mark_in_mlflow(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    if not text:
+    try:
+        note = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        # It died before it could name its run of mlflow, or while it did so.
         return
     from mlflow import MlflowClient
     from mlflow.exceptions import MlflowException
 
-    note = json.loads(text)
     client = MlflowClient(note["tracking_uri"])
     try:
         if client.get_run(note["mlflow_run_id"]).info.status == "RUNNING":

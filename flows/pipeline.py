@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows.dag import Stage, ordered
 from flows.dashboards import REPORT_PORT
-from flows.dvc_runner import reproduce, stale_stages
+from flows.dvc_runner import reproduce, stale_stages, stop_stages
 from flows.living import live
 from flows.prefect_settings import prefect_home
 from flows.servers import HOST
@@ -60,7 +62,13 @@ def pipeline(stages: list[str] | None = None, root: str = ".") -> list[str]:
     note = live(prefect_home(place), str(current_run.id))
     with flow_run(place, name) as parent:
         note(tracking_uri(place.resolve()), parent.run_id)
-        states = _submit(chosen, root)
+        try:
+            states = _submit(chosen, root)
+        except BaseException as error:
+            # An interrupt or a termination, not a failure.
+            if not isinstance(error, Exception):
+                stop_stages()
+            raise
         parent.log_outcome({name: state.name or "" for name, state in states.items()})
         _publish(place, states)
         failed = [name for name, state in states.items() if state.is_failed()]
@@ -70,9 +78,27 @@ def pipeline(stages: list[str] | None = None, root: str = ".") -> list[str]:
 
 
 def run_pipeline(root: Path, stages: list[str] | None, stages_at_once: int) -> list[str]:
-    """Run the flow with at most `stages_at_once` stages side by side."""
+    """Run the flow with at most `stages_at_once` stages side by side.
+
+    Raises LuxError where a stage fails, or where Prefect's server does not answer.
+    """
     runner: Any = ThreadPoolTaskRunner(max_workers=stages_at_once)
-    return pipeline.with_options(task_runner=runner)(stages, str(root))
+    for name in ("prefect.flow_runs", "prefect.task_runs"):
+        logging.getLogger(name).addFilter(_without_traceback)
+    try:
+        return pipeline.with_options(task_runner=runner)(stages, str(root))
+    except RuntimeError as error:
+        if "Failed to reach API" not in str(error):
+            raise
+        address = os.environ.get("PREFECT_API_URL", "its address")
+        raise LuxError(f"no Prefect server answers at {address} (PREFECT_API_URL).") from error
+
+
+def _without_traceback(record: logging.LogRecord) -> bool:
+    """Of a LuxError people need the sentence, not where in the code it was raised."""
+    if record.exc_info and isinstance(record.exc_info[1], LuxError):
+        record.exc_info = None
+    return True
 
 
 def _submit(chosen: list[Stage], root: str) -> dict[str, State]:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from flows.checks import check_project, locked_stages
 from flows.dag import Stage, ordered
 from luxcore.errors import LuxError
 from luxcore.settings.load import load_settings
@@ -35,15 +36,19 @@ class StagePlan:
 
 
 def make_plan(root: Path) -> list[StagePlan]:
-    """The plan of a whole run. Nothing is written."""
+    """The plan of a whole run. Nothing is written.
+
+    Raises InputError where a run would refuse the project's files, LuxError where DVC does.
+    """
+    root = root.resolve()
+    check_project(root)
     from dvc.repo import Repo
 
-    from flows.dvc_runner import locked_stages
+    from flows.dvc_runner import said_by_dvc
 
-    root = root.resolve()
     known = locked_stages(root)
     plans: list[StagePlan] = []
-    with Repo(str(root)) as repo:
+    with said_by_dvc(), Repo(str(root)) as repo:
         for stage in ordered():
             upstream = [p.name for p in plans if p.name in stage.needs and p.state != "fresh"]
             plans.append(_plan_stage(root, repo, known, stage, upstream))
@@ -107,7 +112,11 @@ def _units(root: Path, name: str) -> tuple[int | None, int | None]:
 
 def _last_seconds(root: Path, name: str) -> float | None:
     path = root / "artifacts" / "timings" / f"{name}.json"
-    return json.loads(path.read_text())["wall_s"] if path.is_file() else None
+    try:
+        return float(json.loads(path.read_text(encoding="utf-8"))["wall_s"])
+    except (OSError, ValueError, KeyError, TypeError):
+        # A forecast is no reason to stop: what was never timed here, or is damaged, is not known.
+        return None
 
 
 def _megabytes(root: Path, stage: Stage) -> float | None:

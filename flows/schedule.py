@@ -95,16 +95,27 @@ def default_worktree(root: Path) -> Path:
 
 
 def prepare_worktree(root: Path, place: Path) -> None:
-    """A detached worktree at the project's present commit, using the project's DVC cache."""
+    """A detached worktree at the project's present commit, using the project's DVC cache.
+
+    Raises InputError where `place` is somebody's own checkout.
+    """
     revision = _git(root, "rev-parse", "HEAD")
+    local = place / ".dvc" / "config.local"
+    config = f"[cache]\n    dir = {root / '.dvc' / 'cache'}\n"
     if (place / ".git").exists():
+        # A checkout or another worktree of a person may hold changes that are nowhere else.
+        if (place / ".git").is_dir() or not local.is_file() or local.read_text() != config:
+            raise InputError(
+                f"{place} is a checkout that `lux schedule` did not make, and changes in it would "
+                "be lost; name another folder with --worktree."
+            )
         # Forced: what an earlier run left in tracked files is nobody's work.
         _git(place, "checkout", "--quiet", "--force", "--detach", revision)
     else:
         _git(root, "worktree", "prune")
         _git(root, "worktree", "add", "--quiet", "--detach", str(place), revision)
-    with atomic_file(place / ".dvc" / "config.local") as local:
-        local.write_text(f"[cache]\n    dir = {root / '.dvc' / 'cache'}\n", encoding="utf-8")
+    with atomic_file(local) as path:
+        path.write_text(config, encoding="utf-8")
 
 
 def run_in_worktree(

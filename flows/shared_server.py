@@ -61,7 +61,7 @@ def kept_up(server: Server | None, root: Path) -> Iterator[None]:
 def _server(root: Path) -> Server:
     """At the port of last time, unless somebody else took it while no schedule was running."""
     note = prefect_home(root) / "server.json"
-    port = json.loads(note.read_text())["port"] if note.is_file() else free_port(HOST)
+    port = _noted_port(note) or free_port(HOST)
     server = prefect_server(root, port, schedules=True)
     if not server.answers():
         try:
@@ -70,6 +70,14 @@ def _server(root: Path) -> Server:
             server = prefect_server(root, free_port(HOST), schedules=True)
     write_json(note, {"port": server.port})
     return server
+
+
+def _noted_port(note: Path) -> int | None:
+    """None where there is no note, or a damaged one."""
+    try:
+        return int(json.loads(note.read_text(encoding="utf-8"))["port"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _keep(server: Server, root: Path, stop: threading.Event) -> None:

@@ -7,6 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 from flows.plan import StagePlan
+from luxcore.errors import FormatError
 from luxcore.evaluate.answers import COLUMNS, answers
 
 
@@ -27,11 +28,15 @@ def plan_table(plans: list[StagePlan]) -> str:
 
 
 def metrics_table(root: Path) -> str:
-    """The scores that people ask for first; the report has the whole tables."""
+    """The scores that people ask for first; the report has the whole tables. Raises FormatError."""
     path = root / "artifacts" / "metrics" / "evaluate.json"
     if not path.is_file():
         return "no evaluation yet."
-    rows = [list(answer.row) for answer in answers(json.loads(path.read_text()))]
+    try:
+        scores = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise FormatError(f"{path} is not readable JSON: {error}.") from error
+    rows = [list(answer.row) for answer in answers(scores)]
     return _table(list(COLUMNS), rows)
 
 

@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from luxcore.errors import InputError, LuxError
+from luxcore.errors import InputError, LuxError, system_sentence
 from luxcore.files.atomic import write_json
 from luxcore.lifetime import die_with_parent
 from luxcore.settings.load import load_settings
@@ -28,6 +28,15 @@ def main(arguments: list[str]) -> int:
     except LuxError as error:
         print(f"lux: {error}", file=sys.stderr)
         return error.exit_code
+    except OSError as error:
+        sentence = system_sentence(error)
+        if sentence is None:
+            raise
+        print(f"lux: {sentence}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("lux: stopped.", file=sys.stderr)
+        return 130
     return 0
 
 

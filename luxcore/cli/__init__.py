@@ -7,7 +7,7 @@ import sys
 
 import click
 
-from luxcore.errors import LuxError
+from luxcore.errors import LuxError, system_sentence
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("flows.cli:run", "Run the whole flow, or the stages named."),
@@ -67,12 +67,14 @@ def main() -> None:
     except BrokenPipeError:
         code = 1
     except OSError as error:
-        if error.filename is None:
+        sentence = system_sentence(error)
+        if sentence is None:
             raise
-        code = _complain(f"{error.filename}: {error.strerror}.", 1)
+        code = _complain(sentence, 1)
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _complain(sentence: str, code: int) -> int:
-    print(f"lux: {sentence}", file=sys.stderr)
+    # A file's name may hold a line break.
+    print(f"lux: {' '.join(sentence.splitlines())}", file=sys.stderr)
     return code

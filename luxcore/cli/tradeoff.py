@@ -66,12 +66,16 @@ def _measure(
 ) -> None:
     from luxcore.tradeoff.knobs import KNOBS, ORDER
     from luxcore.tradeoff.page import write_tradeoffs
-    from luxcore.tradeoff.store import merged
+    from luxcore.tradeoff.store import load_measured, merged
     from luxcore.tradeoff.sweep import measure
 
     chosen = [knob for knob in KNOBS if not names or any(name in knob.name for name in names)]
     if not chosen:
         raise InputError(f"no knob is called so; there are: {'; '.join(k.name for k in KNOBS)}.")
+    # Not after the first knob, whose minutes would be lost.
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / "tradeoff.json").exists():
+        load_measured(out / "tradeoff.json")
     sweeps = []
     for knob in chosen:
         with tempfile.TemporaryDirectory(prefix="lux-tradeoff-") as scratch:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
-from luxcore.tradeoff.advise import Trial, Tried
-from luxcore.tradeoff.knob import Work
-from luxcore.tradeoff.sweep import Point, Sweep
+from luxcore.tradeoff.advise import Trial
+from luxcore.tradeoff.sweep import Sweep
 
 VERSION = 2
 
@@ -56,13 +58,19 @@ def load_measured(path: Path) -> Measured:
         data = json.loads(path.read_text(encoding="utf-8"))
         if data["version"] != VERSION:
             raise FormatError(f"{path} is of version {data['version']}, not {VERSION}.")
-        return Measured(
-            data["about"],
-            tuple(_sweep(record) for record in data["sweeps"]),
-            tuple(_trial(record) for record in data["trials"]),
-        )
-    except (ValueError, KeyError, TypeError) as error:
-        raise FormatError(f"{path} does not hold sweeps: {error!r}.") from error
+        measured = TypeAdapter(Measured).validate_python(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise FormatError(
+            f"{path} does not hold sweeps: {where}: {first['msg'].lower()}."
+        ) from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FormatError(f"{path} does not hold sweeps: {error}.") from error
+    for sweep in measured.sweeps:
+        if not _whole(sweep):
+            raise FormatError(f"{path} holds a sweep that is not whole: {sweep.knob}.")
+    return measured
 
 
 def merged(
@@ -89,16 +97,11 @@ def with_trial(measured: Measured, trial: Trial) -> Measured:
     return Measured(measured.about, measured.sweeps, (*others, trial))
 
 
-def _sweep(record: dict[str, Any]) -> Sweep:
-    points = tuple(
-        Point(p["label"], p["settings"], tuple(Work(**work) for work in p["works"]))
-        for p in record["points"]
+def _whole(sweep: Sweep) -> bool:
+    """Whether every choice was measured, and the default is one of them; a few have none."""
+    works = [work for point in sweep.points for work in point.works]
+    return (
+        all(point.works for point in sweep.points)
+        and all(math.isfinite(work.cpu_s) and math.isfinite(work.error) for work in works)
+        and (not sweep.default or sweep.default in {point.label for point in sweep.points})
     )
-    return Sweep(**{**record, "points": points})
-
-
-def _trial(record: dict[str, Any]) -> Trial:
-    works = tuple(
-        Tried(**{**tried, "obtained": Work(**tried["obtained"])}) for tried in record["works"]
-    )
-    return Trial(record["asked"], record["scene"], works)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib
 import multiprocessing
 import resource
+import signal
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from luxcore.errors import LuxError
+from luxcore.lifetime import die_with_parent
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,9 @@ def sentence(error: BaseException) -> str:
 def _child(
     send: Connection, function: str, out_dir: Path, arguments: dict[str, Any], limits: Limits
 ) -> None:
+    # As its parent, a worker that a signal may end without a word: it would leave an orphan.
+    die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     if limits.memory_mb is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limits.memory_mb << 20,) * 2)
     problem = returned = None

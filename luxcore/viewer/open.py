@@ -19,7 +19,8 @@ def open_scene(folder: Path) -> ViewedScene:
     try:
         transforms = json.loads(path.read_text(encoding="utf-8"))
         cameras = tuple(camera_from_nerfstudio(f, transforms) for f in transforms["frames"])
-    except (ValueError, KeyError, TypeError, AttributeError, InputError) as error:
-        raise FormatError(f"{path} holds no usable cameras: {error}.") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError) as error:
+        fact = str(error).rstrip(".")
+        raise FormatError(f"{path} holds no usable cameras: {fact}.") from error
     thumbnails = {lamp.index: folder / f"thumbnails/lamp_{lamp.index}.png" for lamp in scene.lamps}
     return ViewedScene(scene, cameras, {i: p for i, p in thumbnails.items() if p.is_file()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from flows.dashboards import dashboards, serve_dashboards
 from flows.prefect_settings import prefect_environment
 from flows.servers import Server, prefect_server
+from flows.shared_server import name_server
 from luxcore.errors import InputError, LuxError
 from luxcore.ports import free_port
 
@@ -85,3 +87,24 @@ def test_a_port_in_use_is_one_sentence(tmp_path: Path) -> None:
         port = int(taken.getsockname()[1])
         with pytest.raises(InputError, match=f"port {port} on 127.0.0.1"):
             serve_dashboards(tmp_path, dashboards(tmp_path, port, 1, 2), lambda _: None)
+
+
+def test_a_port_given_twice_is_one_sentence(tmp_path: Path) -> None:
+    port = free_port()
+    with pytest.raises(InputError, match=f"port {port} is asked for by mlflow and Prefect"):
+        serve_dashboards(tmp_path, dashboards(tmp_path, port, port, 1), lambda _: None)
+
+
+@pytest.mark.parametrize("note", ["", "{", "[]", '{"port": "x"}'])
+def test_a_damaged_note_of_the_last_port_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, note: str
+) -> None:
+    for name, value in {**prefect_environment(tmp_path), "PREFECT_API_URL": ""}.items():
+        monkeypatch.setenv(name, value)
+    home = tmp_path / "home"
+    monkeypatch.setenv("PREFECT_HOME", str(home))
+    home.mkdir()
+    (home / "server.json").write_text(note)
+    server = name_server(tmp_path)
+    assert server is not None
+    assert json.loads((home / "server.json").read_text()) == {"port": server.port}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import sys
 import time
@@ -42,11 +43,28 @@ def test_flow_and_repro_agree_and_changed_back_comes_from_the_cache(tmp_path, ru
     assert runs(by_flow) == ["rooms", "render"] * 2
 
 
-def test_a_failing_stage_is_one_sentence_and_upstream_is_kept(tmp_path, run_flow):
+def test_a_failing_stage_is_one_sentence_and_upstream_is_kept(tmp_path, run_flow, caplog):
     root = make_project(tmp_path / "p", seed=200)
+    # Prefect's loggers do not propagate.
+    for name in ("prefect.flow_runs", "prefect.task_runs"):
+        logging.getLogger(name).addHandler(caplog.handler)
     with pytest.raises(LuxError, match=r"render failed: the value is too large"):
         run_flow(root)
+    assert "render failed: the value is too large" in caplog.text
+    assert "Traceback" not in caplog.text
     assert (root / "artifacts/rooms/value").read_text() == "201"
+
+
+def test_a_prefect_server_that_does_not_answer_is_one_sentence(tmp_path, monkeypatch):
+    import flows.pipeline as pipeline
+
+    def unreachable(**options):
+        raise RuntimeError("Failed to reach API at http://127.0.0.1:9/api")
+
+    monkeypatch.setattr(pipeline.pipeline, "with_options", unreachable)
+    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
+    with pytest.raises(LuxError, match=r"^no Prefect server answers at http://127\.0\.0\.1:9/api"):
+        pipeline.run_pipeline(tmp_path, None, 1)
 
 
 def test_reasons_and_outcomes_are_said_and_the_lock_is_copied_first(tmp_path):

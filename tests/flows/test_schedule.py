@@ -66,6 +66,18 @@ def test_the_worktree_follows_the_project_and_shares_its_cache(
     assert (place / "params.yaml").read_text() == "seed: 0\n"
 
 
+def test_a_checkout_of_somebody_is_never_overwritten(tmp_path: Path) -> None:
+    root = make_project(tmp_path / "project")
+    commit(root, "first")
+    theirs = tmp_path / "theirs"
+    subprocess.run(["git", "-C", str(root), "worktree", "add", "-q", str(theirs)], check=True)
+    for place in (root, theirs):
+        (place / "second.py").write_text("a change that is nowhere else\n")
+        with pytest.raises(InputError, match=r"(project|theirs) is a checkout that `lux schedule`"):
+            prepare_worktree(root, place)
+        assert (place / "second.py").read_text() == "a change that is nowhere else\n"
+
+
 def test_changes_reach_the_parameters_or_are_refused(project_root: Path) -> None:
     path = project_root / "params.yaml"
     changed = yaml.safe_load(changed_params(path, ["rooms.train=200", "seed=7"]))

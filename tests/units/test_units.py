@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import subprocess
@@ -185,3 +186,48 @@ def test_a_wrong_executor_is_one_sentence(monkeypatch, name, value):
     monkeypatch.setenv(name, value)
     with pytest.raises(InputError, match=name):
         executor_from_environment()
+
+
+INTERRUPTED = """
+from pathlib import Path
+import sys
+from luxcore.units import Unit, UnitStore, run_units
+from luxcore.units.executor import ProcessExecutor
+from luxcore.units.guard import Limits
+if __name__ == "__main__":
+    units = [Unit(str(i), "tests.units.work:sleep", {"seconds": 300}, f"k{i}") for i in range(2)]
+    try:
+        run_units(units, UnitStore(Path(sys.argv[1])), ProcessExecutor(2), limits=Limits(300.0))
+    except KeyboardInterrupt:
+        print("stopped", flush=True)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupt_ends_every_process_of_the_units_without_a_word(tmp_path, project_root, how):
+    """A Ctrl-C reaches all of them; a kill reaches one, and the others must follow it."""
+    script = tmp_path / "script.py"
+    script.write_text(INTERRUPTED)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "store")],
+        env={**os.environ, "PYTHONPATH": str(project_root)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert _eventually(lambda: len(list(tmp_path.rglob("started"))) == 2)
+    if how is signal.SIGINT:
+        os.killpg(process.pid, how)
+    else:
+        process.kill()
+    # Their ends of the pipes are open as long as any of them lives.
+    said, complaints = process.communicate(timeout=60)
+    assert said == ("stopped\n" if how is signal.SIGINT else "")
+    assert "Traceback" not in complaints
+
+
+def _eventually(condition) -> bool:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if condition():
+            return True
+        time.sleep(0.1)
+    return False

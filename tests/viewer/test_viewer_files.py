@@ -16,6 +16,7 @@ from viewer_scene import room_scene, save_room
 from luxcore.cameras import look_at
 from luxcore.cli.view import command
 from luxcore.errors import FormatError, InputError
+from luxcore.files.digests import file_digest
 from luxcore.files.photos import read_photo
 from luxcore.light.agx import agx
 from luxcore.splats.relighting import render_scene
@@ -50,6 +51,17 @@ def test_a_bad_scene_is_one_sentence(tmp_path: Path, spoil, sentence: str) -> No
     assert isinstance(result.exception, (InputError, FormatError))
     assert sentence in str(result.exception)
     assert "\n" not in str(result.exception)
+
+
+@pytest.mark.parametrize("text", ["[]", "[" * 100_000, '{"frames": [{}]}'])
+def test_bad_cameras_are_one_sentence(tmp_path: Path, text: str) -> None:
+    room = save_room(tmp_path / "room")
+    (room / "transforms.json").write_text(text)
+    about = json.loads((room / "scene.json").read_text())
+    about["digests"]["transforms.json"] = file_digest(room / "transforms.json")
+    (room / "scene.json").write_text(json.dumps(about))
+    with pytest.raises(FormatError, match=r"transforms\.json holds no usable cameras: .*[^.]\.$"):
+        open_scene(room)
 
 
 def _set_version(room: Path, version: int) -> None:

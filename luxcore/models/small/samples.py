@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -15,6 +15,10 @@ from luxcore.data.lighting import draw_own_light, draw_relighting, exposed, one_
 
 OWN_LIGHT_SHARE = 0.5
 """Of training photos: the other half gets lamps of any colour and power."""
+
+DARK_SHARE = 0.2
+"""Of photos: no lamp burns in them, as by day. Of photos with a lamp that is off, two in three show
+no other one that burns."""
 
 TRIPOD_SHARE = 0.5
 """Of photos: exposed for one lamp more than burns in them, as when somebody switches it off and
@@ -50,17 +54,24 @@ class CropPool:
         return (crop for group in self.groups for crop in group)
 
     def relit(self, rng: Generator, views: int | None = None) -> list[LitCrop]:
-        """A random group in random order (`views` of it, or all), under new light or its own."""
+        """A random group in random order (`views` of it, or all), under new light or its own, or
+        with all lamps off."""
         group = self.groups[int(rng.integers(len(self.groups)))]
         own_light = bool(rng.random() < OWN_LIGHT_SHARE)
+        dark = bool(rng.random() < DARK_SHARE)
         order = rng.permutation(len(group))[:views]
-        return relit([group[int(i)] for i in order], rng, own_light=own_light)
+        return relit([group[int(i)] for i in order], rng, own_light=own_light, dark=dark)
 
 
-def relit(group: Sequence[LitCrop], rng: Generator, *, own_light: bool = False) -> list[LitCrop]:
-    """The same photos in the same order, all under one new light, or nearly under their own."""
+def relit(
+    group: Sequence[LitCrop], rng: Generator, *, own_light: bool = False, dark: bool = False
+) -> list[LitCrop]:
+    """The same photos in the same order, all under one new light, or nearly under their own; with
+    `dark`, under its ambient light alone."""
     on = group[0].on
     light = draw_own_light(rng, on) if own_light else draw_relighting(rng, len(on))
+    if dark:
+        light = replace(light, on=np.zeros_like(light.on))
     lit = [light.apply(crop) for crop in group]
     metered = one_more_burning(light.on, rng) if rng.random() < TRIPOD_SHARE else light.on
     return exposed(lit, rng, metered=metered)
