@@ -30,6 +30,12 @@ class TrainingSettings(Settings):
     base: str | None = Field(
         "shipped", description='"shipped", a safetensors file, or null to start from scratch'
     )
+    blend: float = Field(
+        1.0,
+        gt=0,
+        le=1,
+        description="share of the trained weights in what is written; the rest is the base's",
+    )
 
 
 class TrainSvSettings(TrainingSettings):

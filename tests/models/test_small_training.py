@@ -10,16 +10,23 @@ import pytest
 import torch
 from numpy.random import PCG64, Generator
 
-from luxcore.errors import DivergedError
+from luxcore.errors import DivergedError, InputError
 from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
 from luxcore.models.small.examples import to_example
 from luxcore.models.small.fit import FitSettings, fit, lamp_loss, schedule
 from luxcore.models.small.network import LampNet, NetworkShape, UNet
-from luxcore.models.small.samples import CropPool
+from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.scores import mean_psnr
 from luxcore.models.small.sketch import SketchRooms
-from luxcore.models.small.training import group_cases, single_cases, widen
+from luxcore.models.small.training import (
+    base_weights,
+    blended,
+    group_cases,
+    single_cases,
+    widen,
+)
 from luxcore.models.small.weights import CHANNELS
+from luxcore.settings.train_sv import TrainingSettings
 from tests.models.sketched import TINY
 
 SETTINGS = FitSettings(steps=6, rate=1e-3, warmup=2, check_every=3)
@@ -164,6 +171,24 @@ def test_the_rate_warms_up_holds_and_ends_near_zero() -> None:
     assert shares[50] == 1.0
     assert shares[99] == pytest.approx(1 / 40)
     assert all(a >= b for a, b in pairwise(shares[60:]))
+
+
+def test_a_photo_without_burning_lamps_shows_its_ambient_light(pool: CropPool) -> None:
+    (dark,) = relit(pool.groups[0][:1], Generator(PCG64(3)), dark=True)
+    assert not dark.on.any()
+    np.testing.assert_array_equal(dark.image_linear, dark.ambient)
+    assert dark.exposure > 0
+
+
+def test_blended_weights_lie_between_the_base_and_the_trained_ones() -> None:
+    base, trained_ones = {"w": torch.tensor([0.0, 2.0])}, {"w": torch.tensor([4.0, 2.0])}
+    assert blended(base, trained_ones, 0.25)["w"].tolist() == [1.0, 2.0]
+    assert blended(base, trained_ones, 1.0)["w"].tolist() == [4.0, 2.0]
+
+
+def test_blending_needs_weights_to_start_from() -> None:
+    with pytest.raises(InputError, match="base"):
+        base_weights("sv", TrainingSettings(base=None, blend=0.5), None)
 
 
 def test_a_widened_network_answers_as_before(pool: CropPool) -> None:

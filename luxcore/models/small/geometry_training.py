@@ -30,7 +30,7 @@ from luxcore.models.small.geometry import (
 from luxcore.models.small.network import NetworkShape, UNet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.surfaces import Surfaces
-from luxcore.models.small.training import WIDTHS, base_weights, fit_settings, pools
+from luxcore.models.small.training import WIDTHS, base_weights, blended, fit_settings, pools
 from luxcore.models.small.weights import load_network, save_weights
 from luxcore.settings.train_sv import TrainingSettings
 
@@ -93,11 +93,13 @@ def train_geometry(
     rng = Generator(PCG64(SeedSequence((seed, 2))))
     cases = [seen_photo(relit([crop], rng)[0]) for crop in aside.photos()]
     batches = PhotoBatches(pool, seed, settings.photos_per_step)
+    original = {name: value.detach().clone() for name, value in net.state_dict().items()}
     fitting: FitSettings = fit_settings(settings)
     result = fit(net, batches, fitting, lambda n: geometry_scores(n, cases), checkpoint, _loss)
-    save_weights(out / "model.safetensors", "geometry", net.shape, result.weights)
+    net.load_state_dict(blended(original, result.weights, settings.blend))
+    save_weights(out / "model.safetensors", "geometry", net.shape, net.state_dict())
     write_json(out / "curve.json", result.curve)
-    return result.curve[-1]
+    return geometry_scores(net.eval(), cases)
 
 
 def geometry_scores(net: UNet, cases: Sequence[tuple[Tensor, SeenPhoto]]) -> dict[str, float]:

@@ -32,6 +32,12 @@ STEPS = 20_000
 @click.option("--size", default=96, show_default=True, help="Side of a photo in pixels.")
 @click.option("--rate", default=2e-3, show_default=True, help="Peak learning rate.")
 @click.option(
+    "--blend",
+    default=TrainingSettings().blend,
+    show_default=True,
+    help="Share of the trained weights in what is written; the rest is the base's.",
+)
+@click.option(
     "--geometry-share",
     default=TrainSvSettings().geometry_share,
     show_default=True,
@@ -50,6 +56,7 @@ def main(
     sketches: int,
     size: int,
     rate: float,
+    blend: float,
     geometry_share: float,
     seed: int,
 ) -> None:
@@ -68,6 +75,7 @@ def main(
         "size_px": size,
         "rate": rate,
         "base": base,
+        "blend": blend,
         "photos_per_step": photos,
         "rooms": rooms,
         "check_every": 200,
