@@ -10,6 +10,7 @@ import yaml
 from pydantic import ValidationError
 
 from luxcore.errors import InputError
+from luxcore.files.input import check_input_file
 from luxcore.settings.base import Settings
 from luxcore.settings.project import ProjectSettings
 
@@ -45,10 +46,7 @@ def load_settings(path: Path) -> ProjectSettings:
 def read_yaml(path: Path) -> Any:
     """Plain data of a small YAML file. Raises InputError."""
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder, not a file.")
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+    check_input_file(path)
     if path.stat().st_size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES} bytes, too large for parameters.")
     try:
