@@ -22,7 +22,7 @@ from luxcore.capture.names import check_id, inside
 from luxcore.capture.points import Points, read_points, write_points
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import atomic_folder, write_json
-from luxcore.files.json_numbers import positive
+from luxcore.files.json_numbers import flag, positive
 from luxcore.files.json_object import read_object
 from luxcore.files.photos import write_png
 
@@ -130,7 +130,7 @@ def load_capture(folder: Path) -> Capture:
             root=folder,
             frames=frames,
             points=read_points(folder / "points.ply"),
-            metric=bool(about["metric"]),
+            metric=flag(about["metric"], "metric"),
             exposure=_exposure(about["exposure"]),
             source=str(about["source"]),
             skipped=tuple(Skipped(s["name"], s["reason"]) for s in about["skipped"]),

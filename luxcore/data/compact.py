@@ -13,7 +13,7 @@ from luxcore.cameras import Camera, camera_from_nerfstudio, camera_to_nerfstudio
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
 from luxcore.files.exr import read_exr, write_exr
-from luxcore.files.json_numbers import finite, parse_json, positive, three
+from luxcore.files.json_numbers import finite, flag, parse_json, positive, three
 
 MASK_KINDS = ("emitter", "fixture", "hull")
 MASKS_FILE = ".masks.exr"
@@ -222,7 +222,7 @@ def _lamp(entry: dict[str, Any]) -> Lamp:
         position=three(entry["position"], f"the position of lamp {name}"),
         power_w=finite(entry["power_w"], f"the power of lamp {name}"),
         color=three(entry["color"], f"the colour of lamp {name}"),
-        on=bool(entry["on"]),
+        on=flag(entry["on"], f"on of lamp {name}"),
         scale=three(entry["scale"], f"the scale of lamp {name}"),
     )
 

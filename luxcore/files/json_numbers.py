@@ -1,4 +1,4 @@
-"""Numbers out of JSON, which may hold NaN, Infinity, 1e999 or a word where a number is due."""
+"""Values out of JSON, which may hold NaN, Infinity, 1e999 or a word where another thing is due."""
 
 from __future__ import annotations
 
@@ -43,6 +43,13 @@ def whole(value: Any, name: str) -> int:
     if number < 0 or number != int(number):
         raise ValueError(f"{name} is {_quoted(value)}, no whole number from 0 on")
     return int(number)
+
+
+def flag(value: Any, name: str) -> bool:
+    """true or false; "no" is neither."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} is {_quoted(value)}, neither true nor false")
+    return value
 
 
 def three(values: Any, name: str) -> tuple[float, float, float]:

@@ -17,6 +17,7 @@ from jaxtyping import Bool
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.atomic import write_json
+from luxcore.files.json_numbers import flag
 from luxcore.files.photos import read_mask, write_png
 
 Mask = Bool[np.ndarray, "h w"]
@@ -116,7 +117,7 @@ def _lamp(record: dict[str, Any]) -> Lamp:
     return Lamp(
         index=int(record["index"]),
         name=str(record["name"]),
-        on=bool(record["on"]),
+        on=flag(record["on"], "on"),
         references=tuple(int(v) for v in record["references"]),
         areas={int(v): int(a) for v, a in record["areas"].items()},
         truth_light=record.get("truth_light"),

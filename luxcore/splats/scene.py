@@ -22,7 +22,7 @@ from luxcore.cameras import Camera, camera_to_nerfstudio
 from luxcore.errors import FormatError
 from luxcore.files.atomic import atomic_file, write_json
 from luxcore.files.digests import file_digest
-from luxcore.files.json_numbers import finite, positive, three, whole
+from luxcore.files.json_numbers import finite, flag, positive, three, whole
 from luxcore.splats.gaussians import Gaussians
 from luxcore.splats.light_views import AMBIENT
 from luxcore.splats.ply import read_ply, write_ply
@@ -118,7 +118,7 @@ def load_scene(folder: Path) -> Scene:
             ambient_scale=three(about["ambient_scale"], "ambient_scale"),
             tone=_tone(about["tone"]),
             views=whole(about["views"], "views"),
-            metric=bool(about.get("metric", False)),
+            metric=flag(about.get("metric", False), "metric"),
         )
     except (KeyError, TypeError) as error:
         raise FormatError(f"{folder / 'scene.json'} lacks a usable {error}.") from error
@@ -157,7 +157,7 @@ def _lamp(record: dict[str, Any]) -> SceneLamp:
     return SceneLamp(
         index=whole(record["index"], f"the index of lamp {name}"),
         name=name,
-        on=bool(record["on"]),
+        on=flag(record["on"], f"on of lamp {name}"),
         scale=three(record["scale"], f"the scale of lamp {name}"),
     )
 

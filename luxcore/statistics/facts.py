@@ -12,7 +12,7 @@ import numpy as np
 from luxcore.data.compact import MASKS_FILE, RenderedView, read_metadata
 from luxcore.errors import FormatError
 from luxcore.files.exr import HALF_MAX, read_exr
-from luxcore.files.json_numbers import finite, three, whole
+from luxcore.files.json_numbers import finite, flag, three, whole
 
 Seconds = Mapping[str, float]
 """CPU seconds by step of a render."""
@@ -125,7 +125,7 @@ def _lamp(
         name=str(lamp["name"]),
         kind=str(lamp["kind"]),
         design=_word(lamp.get("design")),
-        on=bool(lamp["on"]),
+        on=flag(lamp["on"], "on"),
         power_w=finite(lamp["power_w"], "power_w"),
         color=three(lamp["color"], "color"),
         temperature_k=_number(lamp, "temperature_k") or None,

@@ -92,6 +92,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path):
     ("damage", "fact"),
     [
         (lambda about: about.update(exposure=float("nan")), "exposure is null"),
+        (lambda about: about["lamps"][0].update(on="no"), "neither true nor false"),
         (lambda about: about.update(exposure=0), "exposure is 0"),
         (lambda about: about["lamps"][0].update(scale=[1, 1, float("inf")]), "scale of lamp"),
         (lambda about: about["lamps"][0].update(scale=[1, 1, 10**400]), "scale of lamp"),

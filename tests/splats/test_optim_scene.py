@@ -103,6 +103,7 @@ def test_missing_lamp_in_the_description_is_refused(folder: Path) -> None:
         (lambda about: about["tone"].update(beta="dark"), 'beta is "dark"'),
         (lambda about: about["tone"].pop("beta"), "'beta'"),
         (lambda about: about["lamps"][1].update(scale=[1, 1, float("nan")]), "scale of lamp floor"),
+        (lambda about: about["lamps"][1].update(on="no"), "on of lamp floor"),
         (lambda about: about["lamps"][0].update(index=-1), "index of lamp desk"),
         (lambda about: about.update(ambient_scale=[1, 10**400, 1]), "ambient_scale"),
         (lambda about: about.update(ambient_scale={"red": 1}), "ambient_scale"),
