@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 from flows.dag import ordered
+from flows.digests import SKIPPED
 from flows.dvc_runner import environment
 from tests.flows.toy import dvc_repro
 
@@ -98,6 +99,12 @@ def kill_in(root: Path, stage: str, after_s: float) -> None:
     wait_for(lambda: not is_alive(worker), f"{stage} outlived its flow")
 
 
+def outputs(root: Path) -> dict[str, Any]:
+    """Digests of what every stage wrote, but for the report, which shows seconds."""
+    stages = yaml.safe_load((root / "dvc.lock").read_text())["stages"]
+    return {name: stage["outs"] for name, stage in stages.items() if name not in SKIPPED}
+
+
 def test_killed_in_every_stage_the_flow_ends_in_the_same_bytes(
     tmp_path: Path, project_root: Path
 ) -> None:
@@ -109,4 +116,4 @@ def test_killed_in_every_stage_the_flow_ends_in_the_same_bytes(
         kill_in(killed, stage.name, timing["wall_s"] / 2)
     last = start_flow(killed)
     assert last.wait(PATIENCE_S) == 0, (killed / "flow.log").read_text()[-2000:]
-    assert (killed / "dvc.lock").read_bytes() == (quiet / "dvc.lock").read_bytes()
+    assert outputs(killed) == outputs(quiet)
