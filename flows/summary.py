@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from io import StringIO
 from pathlib import Path
 
 from flows.plan import StagePlan
-from luxcore.errors import FormatError
 from luxcore.evaluate.answers import COLUMNS, answers
+from luxcore.files.json_object import read_object
 
 
 def plan_table(plans: list[StagePlan]) -> str:
@@ -32,11 +31,7 @@ def metrics_table(root: Path) -> str:
     path = root / "artifacts" / "metrics" / "evaluate.json"
     if not path.is_file():
         return "no evaluation yet."
-    try:
-        scores = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise FormatError(f"{path} is not readable JSON: {error}.") from error
-    rows = [list(answer.row) for answer in answers(scores)]
+    rows = [list(answer.row) for answer in answers(read_object(path))]
     return _table(list(COLUMNS), rows)
 
 

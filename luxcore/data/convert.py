@@ -11,10 +11,11 @@ from typing import TypeVar
 import numpy as np
 
 from luxcore.cameras import Camera, camera_to_nerfstudio
-from luxcore.data.compact import holds_compact, list_rendered, save_rendered
+from luxcore.data.compact import save_rendered
 from luxcore.data.crops import LitCrop
+from luxcore.data.layouts import views_in
 from luxcore.data.multiview import MultiViewSets
-from luxcore.data.public_reader import PublicScene, open_scenes, public_views
+from luxcore.data.public_reader import PublicScene, open_scenes
 from luxcore.data.public_writer import AS_TAKEN_PASS, write_scene
 from luxcore.data.rotations import quaternion_from_matrix
 from luxcore.data.store import AnyView, by_room, load_view
@@ -85,9 +86,7 @@ def cut_photos(
 
     `source`: views in either form; `size` is (height, width). See `export_photos`.
     """
-    views: Sequence[AnyView] = (
-        list_rendered(source) if holds_compact(source) else public_views(source)
-    )
+    views = views_in(source)
 
     def write(room: str, members: Sequence[AnyView]) -> list[Path]:
         if not _ROOM.fullmatch(room):

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from luxcore.data.compact import holds_compact, list_rendered
 from luxcore.data.crops import LitCrop
+from luxcore.data.layouts import views_in
 from luxcore.data.multiview import MultiViewSets
-from luxcore.data.public_reader import public_views
 from luxcore.data.store import AnyView
 from luxcore.data.training import SingleViewSamples
 from luxcore.errors import InputError
@@ -65,8 +64,6 @@ def set_with_lamp(sets: LitSets, position: int, views: int) -> list[LitCrop]:
 
 
 def _views(settings: DataSettings) -> Sequence[AnyView]:
-    """Views of either layout; shards are read where they lie."""
     if not settings.root:
         raise InputError("training needs rendered rooms: set data.root to their folder.")
-    root = Path(settings.root).expanduser()
-    return list_rendered(root) if holds_compact(root) else public_views(root)
+    return views_in(Path(settings.root).expanduser())
