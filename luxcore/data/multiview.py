@@ -68,9 +68,7 @@ class MultiViewSets:
         Fewer than `views` where a room of perspective views has no more. Lamps that no photo of
         the set shows are part of the ambient light of all.
         """
-        epoch, place = divmod(index, len(self.rooms))
-        order = generator(self.seed, 2, epoch).permutation(len(self.rooms))
-        numbers = self.rooms[int(order[place])]
+        numbers = self.rooms[self.place(index)]
         rng = generator(self.seed, 3, index)
         mask_kind = str(rng.choice(self.mask_kinds))
         target, poses = self._poses(numbers, rng, views, mask_kind)
@@ -82,6 +80,11 @@ class MultiViewSets:
             shared = float(np.median([crop.exposure for crop in crops]))
             crops = [replace(crop, exposure=shared) for crop in crops]
         return self._with_seen_lamps(crops, target)
+
+    def place(self, index: int) -> int:
+        """Which of `rooms` set `index` shows; sets of one room are cheap to cut together."""
+        epoch, place = divmod(index, len(self.rooms))
+        return int(generator(self.seed, 2, epoch).permutation(len(self.rooms))[place])
 
     def _with_seen_lamps(self, crops: list[LitCrop], target: int | None) -> list[LitCrop]:
         seen = {i for crop in crops for i in lamps_in_sight(crop.masks, None)}

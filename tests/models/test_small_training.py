@@ -10,6 +10,7 @@ import pytest
 import torch
 from numpy.random import PCG64, Generator
 
+from luxcore.data.crops import LitCrop
 from luxcore.errors import DivergedError, InputError
 from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
 from luxcore.models.small.examples import to_example
@@ -68,6 +69,28 @@ def test_sketched_light_is_finite_positive_and_falls_off() -> None:
         assert (crop.lights >= 0).all()
         assert (crop.depth_m > 0).all()
         np.testing.assert_allclose(np.linalg.norm(crop.normal, axis=2), 1, atol=1e-3)
+
+
+class TwoRooms:
+    """Sketched photos said to be of two rooms by turns."""
+
+    def __init__(self) -> None:
+        self.made: list[int] = []
+
+    def crops(self, index: int, views: int) -> list[LitCrop]:
+        self.made.append(index)
+        return SketchRooms(1000, 32, 0).crops(index, views)
+
+    def place(self, index: int) -> int:
+        return index % 2
+
+
+def test_a_pool_cuts_room_by_room_and_keeps_the_order() -> None:
+    source = TwoRooms()
+    pool = CropPool.collect(source, range(4), 1)
+    assert source.made == [0, 2, 1, 3]
+    for index, (crop,) in enumerate(pool.groups):
+        np.testing.assert_array_equal(crop.lights, source.crops(index, 1)[0].lights)
 
 
 @pytest.mark.parametrize("kind", [SingleBatches, GroupBatches])
