@@ -14,6 +14,7 @@ from pathlib import Path
 from luxcore.capture import Capture, ingest, load_capture, placed_sentence
 from luxcore.decompose.stage import decompose_capture
 from luxcore.errors import InputError
+from luxcore.files.atomic import write_json
 from luxcore.files.digests import tree_digest
 from luxcore.harmonize.stage import CODE as HARMONIZE_CODE
 from luxcore.harmonize.stage import harmonize_capture
@@ -26,6 +27,9 @@ from luxcore.splats.stage2 import fit_lights
 from luxcore.units import UnitStore, unit_key
 
 Log = Callable[[str], None]
+
+MARK = "work/remix.json"
+"""What tells an earlier result, whole or cut short, from a folder of the user's own."""
 
 _CODE = (*HARMONIZE_CODE, "luxcore/splats", "luxcore/metrics", "kernels")
 """All that any step runs. One list, since every step reads through most of it."""
@@ -63,25 +67,33 @@ def remix(source: Path, out: Path, settings: ProjectSettings, log: Log = print) 
     where too few views can be placed or no lamp is found; then nothing is left behind.
     """
     source, out = Path(source), Path(out)
-    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / "work").is_dir())):
-        raise InputError(f"{out} exists and is not an earlier result of this command.")
+    _check_out(source, out)
     existed = out.exists()
     work = _Work(UnitStore(out / "work"), settings, _name(source))
     try:
+        write_json(out / MARK, {"capture": work.name})
         scene = _run(source, work, log)
     except BaseException:
-        if not existed and not any((out / "work").glob("*/*/manifest.json")):
-            shutil.rmtree(out, ignore_errors=True)
+        if not any((out / "work").glob("*/*/manifest.json")):
+            shutil.rmtree(out / "work" if existed else out, ignore_errors=True)
         raise
     _publish(scene, out)
     log(f"scene: {out}")
     return out
 
 
-def _run(source: Path, work: _Work, log: Log) -> Path:
-    settings, seed = work.settings, work.settings.seed
+def _check_out(source: Path, out: Path) -> None:
+    """Raises InputError where `out` holds something else, or would change what `source` holds."""
     if not source.is_dir():
         raise InputError(f"{source} is not a folder.")
+    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / MARK).is_file())):
+        raise InputError(f"{out} exists and is not an earlier result of this command.")
+    if out.resolve().is_relative_to(source.resolve()):
+        raise InputError(f"{out} lies in {source}, the photos' folder; name one outside of it.")
+
+
+def _run(source: Path, work: _Work, log: Log) -> Path:
+    settings, seed = work.settings, work.settings.seed
     captured = work.step("capture", [source], lambda o: ingest(source, o, settings.capture, seed))
     capture = load_capture(captured)
     log(placed_sentence(capture))

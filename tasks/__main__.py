@@ -22,6 +22,9 @@ from tasks.system_metrics import Sample, SystemSampler
 
 def main(arguments: list[str]) -> int:
     """Run one stage; one sentence on standard error and a code other than 0 where it fails."""
+    if arguments in (["-h"], ["--help"]):
+        print(f"{__doc__}\n\n{_usage()}")
+        return 0
     try:
         die_with_parent()
         run_stage(_stage_name(arguments), Path.cwd())
@@ -72,8 +75,12 @@ def _record(context: StageContext, does: str, seconds: float, samples: list[Samp
 
 def _stage_name(arguments: list[str]) -> str:
     if len(arguments) != 1 or arguments[0] not in STAGE_NAMES:
-        raise InputError(f"usage: python -m tasks STAGE, one of {', '.join(STAGE_NAMES)}.")
+        raise InputError(_usage())
     return arguments[0]
+
+
+def _usage() -> str:
+    return f"usage: python -m tasks STAGE, one of {', '.join(STAGE_NAMES)}."
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from luxcore.errors import InputError
+
 
 @click.command(name="statistics")
 @click.argument("folder", type=click.Path(path_type=Path))
@@ -24,6 +26,8 @@ def command(folder: Path, units: Path | None, title: str, out: Path | None) -> N
     from luxcore.units import UnitStore, read_seconds
 
     seconds = read_seconds(UnitStore(units)) if units else None
+    if units and not seconds:
+        raise InputError(f"{units} keeps no seconds of a render.")
     target = out or (folder if folder.is_dir() else folder.parent)
     facts = write_statistics(folder, target, title=title, seconds=seconds)
     click.echo(f"{len(facts)} views of {len({f.room for f in facts})} rooms: {target / PAGE}")

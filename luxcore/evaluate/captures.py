@@ -14,6 +14,7 @@ from luxcore.data.crops import LitCrop
 from luxcore.decompose.views import view_masks
 from luxcore.errors import FormatError, LuxError
 from luxcore.files.exr import read_exr
+from luxcore.files.json_numbers import flag
 from luxcore.files.json_object import read_object
 from luxcore.harmonize.poses import pose_distance
 from luxcore.masks.store import LampMasks, load_masks
@@ -48,7 +49,7 @@ def true_view(capture: Capture, masks: LampMasks, view: int, side_px: int) -> Li
     try:
         lights = np.stack([layers[f"light_{i:02d}"][..., :3] for i in range(len(about["lamps"]))])
         scale = np.array([lamp["scale"] for lamp in about["lamps"]], np.float32)
-        on = np.array([lamp["on"] for lamp in about["lamps"]], bool)
+        on = np.array([flag(lamp["on"], "on") for lamp in about["lamps"]], bool)
         ambient, exposure = layers["ambient"][..., :3], float(about["exposure"])
         distance, normal = geometry["ray_distance_m"][..., 0], geometry["normal"][..., :3]
     except (KeyError, ValueError) as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from luxcore.capture.drawn_masks import mask_files
 from luxcore.capture.store import Capture
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import read_exr
+from luxcore.files.json_numbers import flag
 from luxcore.files.json_object import read_object
 from luxcore.files.photos import read_mask, read_photo
 from luxcore.light.agx import agx_inverse
@@ -27,8 +27,7 @@ def truth_lamps(capture: Capture, settings: MasksSettings) -> list[FoundLamp]:
     """
     if capture.truth is None:
         raise InputError(f"{capture.root} has no truth to take masks from.")
-    about = read_object(capture.truth / "lights.json")
-    lamps: list[dict[str, Any]] = about.get("lamps", [])
+    lamps = _true_lamps(capture.truth / "lights.json")
     masks: list[dict[int, Mask]] = [{} for _ in lamps]
     for view in range(len(capture.frames)):
         path = capture.truth / f"{view:04d}.masks.exr"
@@ -40,13 +39,13 @@ def truth_lamps(capture: Capture, settings: MasksSettings) -> list[FoundLamp]:
     sharpness = capture_sharpness(capture)
     return [
         FoundLamp(
-            name=str(lamp.get("name", f"lamp_{light}")),
-            on=bool(lamp["on"]),
+            name=name,
+            on=on,
             masks=seen,
             references=best_views(seen, sharpness, settings.references),
             truth_light=light,
         )
-        for light, (lamp, seen) in enumerate(zip(lamps, masks, strict=True))
+        for light, ((name, on), seen) in enumerate(zip(lamps, masks, strict=True))
         if seen
     ]
 
@@ -73,6 +72,20 @@ def capture_sharpness(capture: Capture) -> dict[int, float]:
     """Sharpness of every view's photo."""
     photos = (read_photo(frame.image_path) for frame in capture.frames)
     return {view: photo_sharpness(photo) for view, photo in enumerate(photos)}
+
+
+def _true_lamps(path: Path) -> list[tuple[str, bool]]:
+    """Name of every lamp, and whether it burns."""
+    records = read_object(path).get("lamps", [])
+    try:
+        return [
+            (str(record.get("name", f"lamp_{light}")), flag(record["on"], f"on of lamp {light}"))
+            for light, record in enumerate(records)
+        ]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FormatError(f"{path} is not a list of lamps: {error!r}.") from error
+    except ValueError as error:
+        raise FormatError(f"{path}: {error}.") from error
 
 
 def _truth_mask(path: Path, layers: dict[str, np.ndarray], light: int) -> Mask:

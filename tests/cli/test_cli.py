@@ -74,6 +74,8 @@ def test_help_names_every_command():
         (["run", "rendr"], "did you mean render?"),
         (["schedule"], "--cron"),
         (["remix", "no-such-folder", "--out", "x"], "no-such-folder"),
+        (["evaluate", "--dataset", ".", "--sv-weights", "no.st"], "no.st does not exist"),
+        (["statistics", ".", "--units", "no-store"], "no-store keeps no seconds"),
         (["relight", "ü \n灯", "--out", "x.png"], "ü  灯/scene.json does not exist"),
         (["relight", "scene", "--ev", "nan", "--out", "x.png"], "'nan' is not a finite number"),
         (["relight", "scene", "--ev", "33", "--out", "x.png"], "range"),

@@ -9,6 +9,7 @@ import pytest
 
 from luxcore import remix as remixing
 from luxcore.capture import load_capture
+from luxcore.errors import InputError
 from luxcore.settings.decompose import DecomposeSettings
 from luxcore.settings.harmonize import HarmonizeSettings
 from luxcore.settings.project import ProjectSettings
@@ -63,3 +64,30 @@ def test_other_bytes_under_the_name_of_the_weights_make_their_step_stale(
     assert remix(settings) == ["harmonize_capture"]
     sv.write_text("two")
     assert remix(settings) == ["decompose_capture"]
+
+
+def test_a_folder_of_ones_own_is_no_earlier_result(remix: Remix, tmp_path: Path) -> None:
+    mine = tmp_path / "out" / "work" / "notes.txt"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    with pytest.raises(InputError, match="not an earlier result"):
+        remix(ProjectSettings())
+    assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [mine]
+
+
+def test_a_scene_among_the_photos_it_is_made_of_is_refused(tmp_path: Path) -> None:
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    with pytest.raises(InputError, match="lies in"):
+        remixing.remix(photos, photos / "scene", ProjectSettings())
+    assert not any(photos.iterdir())
+
+
+def test_nothing_is_left_where_no_step_ended(tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "mine").mkdir()
+    for out in (tmp_path / "new", tmp_path / "mine"):
+        with pytest.raises(InputError):
+            remixing.remix(tmp_path / "photos", out, ProjectSettings(), log=lambda _: None)
+    assert not (tmp_path / "new").exists()
+    assert not any((tmp_path / "mine").iterdir())

@@ -72,6 +72,15 @@ def test_truth_that_is_not_there(tmp_path: Path, row_of_cameras) -> None:
     assert not (tmp_path / "m").exists()
 
 
+@pytest.mark.parametrize("lamp", [{"on": "no"}, {}, "desk"])
+def test_truth_that_does_not_say_which_lamps_burn(tmp_path: Path, row_of_cameras, lamp) -> None:
+    capture = _with_truth(tmp_path / "t", row_of_cameras[:2])
+    assert capture.truth is not None
+    write_json(capture.truth / "lights.json", {"lamps": [lamp]})
+    with pytest.raises(FormatError, match=r"lights\.json"):
+        find_lamps(capture, tmp_path / "m", MasksSettings())
+
+
 def test_the_users_masks_go_first(tmp_path: Path, row_of_cameras) -> None:
     capture = _with_truth(tmp_path / "t", row_of_cameras[:3])
     drawn = tmp_path / "drawn"
