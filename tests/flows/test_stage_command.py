@@ -10,7 +10,8 @@ from tasks.context import STAGE_NAMES
 
 def test_help_lists_the_stages_and_is_no_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
-    assert all(name in capsys.readouterr().out for name in STAGE_NAMES)
+    said = capsys.readouterr().out
+    assert all(name in said for name in STAGE_NAMES)
 
 
 @pytest.mark.parametrize("arguments", [[], ["rendr"], ["rooms", "render"]])
