@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Any
 
 from luxcore.capture import Capture, load_capture
-from luxcore.errors import FormatError, InputError
+from luxcore.errors import FormatError
 from luxcore.files.atomic import write_json
 from luxcore.files.digests import tree_digest
+from luxcore.files.json_object import read_object
 from luxcore.harmonize.plan import Pass, PassPlan, plan_passes
 from luxcore.harmonize.poses import pose_distance, views_linked
 from luxcore.progress import progress
@@ -165,10 +165,8 @@ def _input_digests(inputs: dict[str, str | None]) -> list[str]:
 
 def _references(decompose_dir: Path) -> list[int]:
     path = decompose_dir / "decompose.json"
-    if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+    about = read_object(path)
     try:
-        about = json.loads(path.read_text(encoding="utf-8"))
         return sorted({int(view) for views in about["references"] for view in views})
     except (ValueError, KeyError, TypeError) as error:
         raise FormatError(f"{path} names no reference views: {error!r}.") from error
