@@ -26,6 +26,8 @@ def check_project(root: Path) -> None:
     locked_stages(root)
     if not (root / ".dvc").is_dir():
         raise InputError(f"{root} has no .dvc folder: `dvc init` makes one.")
+    for config in _dvc_configs(root):
+        _check_dvc_config(config)
     in_git = any((folder / ".git").exists() for folder in (root, *root.parents))
     if not in_git and not _works_without_git(root):
         raise InputError(f"{root} is not in a git repository, which DVC needs: run `git init`.")
@@ -77,7 +79,21 @@ def _check_dvc_yaml(path: Path) -> None:
             )
 
 
+def _dvc_configs(root: Path) -> list[Path]:
+    files = (root / ".dvc" / "config", root / ".dvc" / "config.local")
+    return [file for file in files if file.is_file()]
+
+
+def _check_dvc_config(path: Path) -> None:
+    # DVC reads it with the same library, but says so only once it has started.
+    from configobj import ConfigObj, ConfigObjError
+
+    try:
+        ConfigObj(str(path), interpolation=False, encoding="utf-8")
+    except (ConfigObjError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not what DVC writes: {str(error).rstrip('.')}.") from error
+
+
 def _works_without_git(root: Path) -> bool:
     """Whether DVC was told so, by `dvc config core.no_scm true`."""
-    files = (root / ".dvc" / "config", root / ".dvc" / "config.local")
-    return any(b"no_scm" in file.read_bytes() for file in files if file.is_file())
+    return any(b"no_scm" in file.read_bytes() for file in _dvc_configs(root))

@@ -70,6 +70,8 @@ DAMAGES: list[tuple[Callable[[Path], object], str]] = [
     (text("dvc.yaml", b"stages: {rooms: {cmd: ls}}"), "dvc.yaml has no stage render"),
     (text("dvc.yaml", b"\xff"), "dvc.yaml is not text"),
     (folder("dvc.yaml"), "dvc.yaml is a folder"),
+    (text(".dvc/config", b"[core"), ".dvc/config is not what DVC writes: Invalid line"),
+    (text(".dvc/config.local", b"\xff"), ".dvc/config.local is not what DVC writes"),
     (text("dvc.lock", b"stages: [1"), "dvc.lock is not plain YAML"),
     (text("dvc.lock", b"- 1"), "dvc.lock is not what DVC writes"),
     (
