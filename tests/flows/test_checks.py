@@ -128,7 +128,7 @@ def test_a_project_that_dvc_uses_without_git_is_none_of_our_business(project):
 
 
 def test_what_only_dvc_can_see_is_one_sentence_too(project):
-    (project / ".dvc" / "config").write_text("[[")
+    (project / ".dvc" / "config").write_text("[core]\n    nope = true\n")
     with pytest.raises(LuxError, match=r"^DVC: config file error: .*\.$"):
         make_plan(project)
 
