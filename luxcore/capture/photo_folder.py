@@ -9,8 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 from luxcore.capture.store import Skipped
-from luxcore.errors import InputError
-from luxcore.files.photos import PHOTO_SUFFIXES, list_photos, read_photo, write_png
+from luxcore.errors import FormatError, InputError
+from luxcore.files.photos import (
+    PHOTO_SUFFIXES,
+    list_photos,
+    open_picture,
+    read_photo,
+    write_png,
+)
 
 MIN_SIDE = 48
 """Pixels; a smaller picture has too few features to be placed."""
@@ -106,13 +112,12 @@ def _reason(path: Path, error: InputError) -> str:
 
 
 def _focal_px(path: Path, longest_side: int) -> float | None:
-    from PIL import Image
-
-    with Image.open(path) as image:
-        value = image.getexif().get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0)
     try:
+        with open_picture(path) as image:
+            value = image.getexif().get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0)
         focal_mm = float(value)
-    except (TypeError, ValueError, ZeroDivisionError):
+    # A photo whose pixels can be read is used, whatever its EXIF is like.
+    except (FormatError, TypeError, ValueError, ZeroDivisionError):
         return None
     # 36 mm is the long side of the film that the equivalent refers to.
     return longest_side * focal_mm / 36.0 if 8 <= focal_mm <= 400 else None

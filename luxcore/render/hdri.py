@@ -10,6 +10,7 @@ import numpy as np
 
 from luxcore.errors import FormatError, InputError
 from luxcore.files.exr import HALF_MAX, read_exr_image
+from luxcore.files.quiet import quiet
 from luxcore.light.blackbody import LUMINANCE_709
 
 
@@ -67,7 +68,8 @@ def _read_hdri(path: Path) -> np.ndarray:
         return read_exr_image(path, finite=False)
     import cv2
 
-    pixels = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    with quiet():
+        pixels = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     if pixels is None:
         raise FormatError(f"{path} is not a readable Radiance picture.")
     return pixels[..., ::-1].astype(np.float32)

@@ -159,6 +159,17 @@ def test_large_photos_are_reduced_upright_with_their_focal_length(tmp_path: Path
     assert staged[0].focal_px == pytest.approx(200 * 28 / 36)
 
 
+@pytest.mark.filterwarnings("error")
+def test_damaged_exif_costs_the_focal_length_alone(tmp_path: Path) -> None:
+    cut_short = b"Exif\0\0II*\0\x08\0\0\0\x40\0" + bytes(7)
+    image = Image.fromarray(np.full((60, 80, 3), 128, np.uint8))
+    image.save(tmp_path / "a.jpg", exif=cut_short)
+    (tmp_path / "w").mkdir()
+    staged, skipped = stage_photos([tmp_path / "a.jpg"], tmp_path / "w", 200)
+    assert not skipped
+    assert staged[0].focal_px is None
+
+
 def _nerfstudio(folder: Path, box_room, cameras: list[Camera], **shared: object) -> Path:
     (folder / "images").mkdir(parents=True)
     frames = []

@@ -126,7 +126,7 @@ def test_environments_of_blender() -> None:
         hdri_path("/nowhere/sky.exr")
 
 
-def test_environments_of_a_user(tmp_path: Path) -> None:
+def test_environments_of_a_user(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Radiance and OpenEXR pictures; the mean is over the sphere, where poles weigh little."""
     sky = np.full((32, 64, 3), 1.0, np.float32)
     sky[:4] = 9.0
@@ -141,6 +141,7 @@ def test_environments_of_a_user(tmp_path: Path) -> None:
     (tmp_path / "broken.hdr").write_bytes(b"#?RADIANCE nothing")
     with pytest.raises(FormatError, match=r"broken\.hdr"):
         mean_luminance(tmp_path / "broken.hdr")
+    assert capfd.readouterr().err == ""
 
 
 @pytest.fixture
