@@ -28,7 +28,7 @@ from luxcore.units import UnitStore, unit_key
 
 Log = Callable[[str], None]
 
-MARK = "work/remix.json"
+_MARK = "work/remix.json"
 """What tells an earlier result, whole or cut short, from a folder of the user's own."""
 
 _CODE = (*HARMONIZE_CODE, "luxcore/splats", "luxcore/metrics", "kernels")
@@ -71,7 +71,7 @@ def remix(source: Path, out: Path, settings: ProjectSettings, log: Log = print) 
     existed = out.exists()
     work = _Work(UnitStore(out / "work"), settings, _name(source))
     try:
-        write_json(out / MARK, {"capture": work.name})
+        write_json(out / _MARK, {"capture": work.name})
         scene = _run(source, work, log)
     except BaseException:
         if not any((out / "work").glob("*/*/manifest.json")):
@@ -86,7 +86,7 @@ def _check_out(source: Path, out: Path) -> None:
     """Raises InputError where `out` holds something else, or would change what `source` holds."""
     if not source.is_dir():
         raise InputError(f"{source} is not a folder.")
-    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / MARK).is_file())):
+    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / _MARK).is_file())):
         raise InputError(f"{out} exists and is not an earlier result of this command.")
     if out.resolve().is_relative_to(source.resolve()):
         raise InputError(f"{out} lies in {source}, the photos' folder; name one outside of it.")

@@ -97,10 +97,11 @@ def command(
 ) -> None:
     """Score the models on DATASET and print both tables, in the paper's form."""
     _check_given(dataset, public_cases, public_cameras)
-    for model, weights_path in ((backend, sv_weights), (mv_backend, mv_weights)):
-        # Of the paper's models a name that is no path may be a hub id.
-        if model == "small" and weights_path is not None:
-            check_input_file(weights_path)
+
+    from luxcore.models.backends import check_weights
+
+    check_weights(backend, sv_weights)
+    check_weights(mv_backend, mv_weights)
 
     from luxcore.evaluate.dataset import evaluation_views
     from luxcore.evaluate.public_run import evaluate_public

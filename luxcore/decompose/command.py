@@ -38,11 +38,13 @@ def decompose_file(
 
     Raises InputError or FormatError for files that cannot be used; `out` is then left as it was.
     """
+    from luxcore.models.backends import check_weights, open_decomposer
+
     check_out_folder(out, WRITTEN, mark="lights.json")
+    check_weights(backend, settings.sv_weights)
     shown, linear = _read(photo_path)
     masks, names, off = _masks(shown, mask_paths, off_paths)
     from luxcore.decompose.photo import decompose_photo
-    from luxcore.models.backends import open_decomposer
 
     with atomic_folder(out) as folder:
         on = burning_lamps(linear, masks) & ~off

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 from luxcore.errors import InputError
+from luxcore.files.input import check_input_file
 from luxcore.models.interface import BackendSettings, Decomposer, Harmonizer
 
 BACKENDS = {
@@ -14,6 +16,15 @@ BACKENDS = {
     "multiview-unet": "luxcore.models.multiview_unet.backend",
 }
 """Name to module; imported only when asked for, since diffusers alone takes 8 s."""
+
+
+def check_weights(name: str, weights: str | Path | None) -> None:
+    """Raises InputError where weights of the small model are not there, before torch is loaded.
+
+    Of the paper's models a name that is no path may be a hub id.
+    """
+    if name == "small" and weights is not None:
+        check_input_file(Path(weights))
 
 
 def open_decomposer(name: str, settings: BackendSettings) -> Decomposer:
