@@ -14,7 +14,7 @@ from luxcore.data.crops import LitCrop
 from luxcore.errors import DivergedError, InputError
 from luxcore.models.small.batches import Disturbance, GroupBatches, SingleBatches
 from luxcore.models.small.examples import to_example
-from luxcore.models.small.fit import FitSettings, fit, lamp_loss, schedule
+from luxcore.models.small.fit import FitSettings, fit, lamp_loss, prepared, schedule
 from luxcore.models.small.network import LampNet, NetworkShape, UNet
 from luxcore.models.small.samples import CropPool, relit
 from luxcore.models.small.scores import mean_psnr
@@ -101,6 +101,16 @@ def test_a_batch_depends_on_its_number_only(kind: type, pool: CropPool) -> None:
     for (a, _), (b, _) in zip(first, again, strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=0)
     assert not torch.equal(first[0][0], batches.batch(4)[0][0])
+
+
+def test_batches_made_ahead_by_other_processes_are_the_same(pool: CropPool) -> None:
+    batches = SingleBatches(pool, 5, photos=2)
+    here, ahead = (list(prepared(batches, range(2, 5), workers)) for workers in (0, 2))
+    assert len(here) == len(ahead) == 3
+    for one, other in zip(here, ahead, strict=True):
+        for (features, example), (again, same) in zip(one, other, strict=True):
+            torch.testing.assert_close(features, again, rtol=0, atol=0)
+            torch.testing.assert_close(example.lights, same.lights, rtol=0, atol=0)
 
 
 def test_references_that_the_single_view_model_took_apart_tell_of_their_own_lamps_only(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
+from torch.nn.attention import SDPBackend, sdpa_kernel
+from torch.utils.data import DataLoader, Dataset
 
 from luxcore.errors import DivergedError
 from luxcore.files.atomic import atomic_file
@@ -18,12 +20,15 @@ from luxcore.models.small.losses import example_loss
 from luxcore.models.small.network import UNet, channels_last
 from luxcore.progress import progress
 
+Batch = Sequence[tuple[Tensor, Any]]
+"""Examples, each behind the features that the network reads of it."""
+
 
 @runtime_checkable
 class Batches(Protocol):
-    """Examples by step, with the features that the network reads; pure functions of the number."""
+    """Batches by step; pure functions of the number."""
 
-    def batch(self, step: int) -> Sequence[tuple[Tensor, Any]]: ...
+    def batch(self, step: int) -> Batch: ...
 
 
 Loss = Callable[[Tensor, Any], Tensor]
@@ -70,21 +75,47 @@ def fit(
     validate: Validate,
     checkpoint: Path | None = None,
     loss: Loss = lamp_loss,
+    workers: int = 0,
 ) -> FitResult:
-    """Train `net` in place. With `checkpoint`, an interrupted call continues to the same bits."""
+    """Train `net` in place. With `checkpoint`, an interrupted call continues to the same bits.
+
+    `workers` processes make batches ahead of their use; 0 makes each when it is needed.
+    """
     state = _Fit(net, settings, validate, loss)
     if checkpoint is not None and checkpoint.is_file():
         state.load(torch.load(checkpoint, weights_only=True))
     with progress("training", settings.steps, "steps") as bar:
         bar.advance(state.step)
-        while state.step < settings.steps:
-            smooth = state.advance(batches.batch(state.step))
+        for batch in prepared(batches, range(state.step, settings.steps), workers):
+            smooth = state.advance(batch)
             bar.advance(loss=f"{smooth:.4f}")
             if state.step % settings.check_every == 0 or state.step == settings.steps:
                 state.check()
                 if checkpoint is not None:
                     state.save(checkpoint)
     return FitResult(state.best or state.ema, state.curve)
+
+
+def prepared(batches: Batches, steps: range, workers: int) -> Iterable[Batch]:
+    """The batches of `steps`, in order. Each is a function of its number alone, so `workers`
+    change how long it takes and no bit."""
+    if not workers or not len(steps):
+        return (batches.batch(step) for step in steps)
+    return DataLoader(
+        _ByStep(batches), batch_size=None, sampler=steps, num_workers=workers, collate_fn=_as_made
+    )
+
+
+def _as_made(batch: Batch) -> Batch:
+    return batch
+
+
+@dataclass(frozen=True)
+class _ByStep(Dataset[Batch]):
+    batches: Batches
+
+    def __getitem__(self, step: int) -> Batch:
+        return self.batches.batch(step)
 
 
 class _Fit:
@@ -105,14 +136,18 @@ class _Fit:
         self.curve: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}
 
-    def advance(self, batch: Sequence[tuple[Tensor, Any]]) -> float:
+    def advance(self, batch: Batch) -> float:
         """One step on all lamps of a batch of photos."""
         for group in self.optimizer.param_groups:
             group["lr"] = self.settings.rate * schedule(self.step, self.settings)
         features = torch.cat([f for f, _ in batch]).contiguous(memory_format=torch.channels_last)
         counts = [len(f) for f, _ in batch]
         photo = torch.repeat_interleave(torch.arange(len(counts)), torch.tensor(counts))
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bf16):
+        # Backwards, torch's fused attention takes two to three times as long on grids this coarse.
+        with (
+            torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bf16),
+            sdpa_kernel(SDPBackend.MATH),
+        ):
             outputs = self.net(features, photo)
         parts = outputs.float().split(counts)
         losses = [self.loss_of(p, example) for p, (_, example) in zip(parts, batch, strict=True)]

@@ -19,7 +19,7 @@ from luxcore.data.repaint import repainted
 from luxcore.files.atomic import write_json
 from luxcore.models.small.examples import to_example
 from luxcore.models.small.features import photo_features
-from luxcore.models.small.fit import FitSettings, fit
+from luxcore.models.small.fit import fit
 from luxcore.models.small.geometry import (
     GEOMETRY_OUTPUTS,
     PHOTO_CHANNELS,
@@ -82,9 +82,10 @@ def train_geometry(
     seed: int,
     *,
     checkpoint: Path | None = None,
+    workers: int = 0,
 ) -> dict[str, float]:
     """Train on the rendered views below `dataset_dir`; writes `model.safetensors` and `curve.json`
-    into `out` and returns the scores on photos kept aside.
+    into `out` and returns the scores on photos kept aside. `workers` as in `train_sv`.
     """
     pool, aside = pools(dataset_dir, settings, seed)
     torch.manual_seed(seed)
@@ -94,8 +95,15 @@ def train_geometry(
     cases = [seen_photo(relit([crop], rng)[0]) for crop in aside.photos()]
     batches = PhotoBatches(pool, seed, settings.photos_per_step)
     original = {name: value.detach().clone() for name, value in net.state_dict().items()}
-    fitting: FitSettings = fit_settings(settings)
-    result = fit(net, batches, fitting, lambda n: geometry_scores(n, cases), checkpoint, _loss)
+    result = fit(
+        net,
+        batches,
+        fit_settings(settings),
+        lambda n: geometry_scores(n, cases),
+        checkpoint,
+        _loss,
+        workers,
+    )
     net.load_state_dict(blended(original, result.weights, settings.blend))
     save_weights(out / "model.safetensors", "geometry", net.shape, net.state_dict())
     write_json(out / "curve.json", result.curve)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -43,6 +44,13 @@ STEPS = 20_000
     show_default=True,
     help="Single-view photos that come with depth and normals; of the others both are guessed.",
 )
+@click.option(
+    "--workers",
+    default=1,
+    show_default=True,
+    type=click.IntRange(0, 64),
+    help="Processes that make photos ahead of their use; any number gives the same weights.",
+)
 @click.option("--seed", default=0, show_default=True)
 def main(
     kind: str,
@@ -58,6 +66,7 @@ def main(
     rate: float,
     blend: float,
     geometry_share: float,
+    workers: int,
     seed: int,
 ) -> None:
     """Train the geometry, the single-view (sv) or the multi-view (mv) model, in this order: each
@@ -83,19 +92,17 @@ def main(
         "cooldown": 0.4,
     }
     out.mkdir(parents=True, exist_ok=True)
-    checkpoint = out / "state.ckpt"
+    how: dict[str, Any] = {"checkpoint": out / "state.ckpt", "workers": workers}
     try:
         if kind == "geometry":
-            scores = train_geometry(
-                data, out, TrainingSettings(**shared), seed, checkpoint=checkpoint
-            )
+            scores = train_geometry(data, out, TrainingSettings(**shared), seed, **how)
             click.echo(f"{out}: {scores}")
             return
         if kind == "sv":
             settings = TrainSvSettings(**shared, geometry_share=geometry_share)
-            result = train_sv(data, out, settings, seed, checkpoint=checkpoint)
+            result = train_sv(data, out, settings, seed, **how)
         else:
-            result = train_mv(data, out, TrainMvSettings(**shared), seed, checkpoint=checkpoint)
+            result = train_mv(data, out, TrainMvSettings(**shared), seed, **how)
     except LuxError as error:
         click.echo(f"lux: {error}", err=True)
         sys.exit(error.exit_code)

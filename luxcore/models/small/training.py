@@ -72,12 +72,13 @@ def train_sv(
     *,
     base: Path | None = None,
     checkpoint: Path | None = None,
+    workers: int = 0,
 ) -> TrainingResult:
     """Train the single-view model on the rendered views below `dataset_dir`.
 
     Writes `model.safetensors`, `card.json` and `curve.json` into `out`. `base` are weights to
     start from (default: as the settings say). With `checkpoint` an interrupted training goes on
-    where it was, to the same bits.
+    where it was, to the same bits. `workers` processes make photos ahead of their use.
     """
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("sv", base_weights("sv", settings, base), seed)
@@ -86,7 +87,7 @@ def train_sv(
         pool, seed, settings.photos_per_step, settings.geometry_share, estimator
     )
     cases = single_cases(aside, seed, estimator)
-    return _train("sv", net, batches, cases, settings, out, checkpoint, dataset_dir)
+    return _train("sv", net, batches, cases, settings, out, checkpoint, dataset_dir, workers)
 
 
 def train_mv(
@@ -97,15 +98,15 @@ def train_mv(
     *,
     base: Path | None = None,
     checkpoint: Path | None = None,
+    workers: int = 0,
 ) -> TrainingResult:
     """Train the multi-view model; see `train_sv`. From scratch it starts from the shipped
     single-view weights, whose channels it shares."""
     pool, aside = pools(dataset_dir, settings, seed)
     net = start_network("mv", base_weights("mv", settings, base), seed)
     batches = GroupBatches(pool, seed, settings.photos_per_step, shipped_network("sv"))
-    return _train(
-        "mv", net, batches, group_cases(aside, seed), settings, out, checkpoint, dataset_dir
-    )
+    cases = group_cases(aside, seed)
+    return _train("mv", net, batches, cases, settings, out, checkpoint, dataset_dir, workers)
 
 
 def pools(dataset_dir: Path, settings: TrainingSettings, seed: int) -> tuple[CropPool, CropPool]:
@@ -204,12 +205,13 @@ def _train(
     out: Path,
     checkpoint: Path | None,
     dataset_dir: Path,
+    workers: int,
 ) -> TrainingResult:
     if not cases:
         raise InputError(f"{dataset_dir} shows no lamp in its validation photos.")
     before = mean_psnr(net.eval(), cases)
     original = {name: value.detach().clone() for name, value in net.state_dict().items()}
-    result = _fit(net, batches, settings, lambda n: lamp_scores(n, cases), checkpoint)
+    result = _fit(net, batches, settings, lambda n: lamp_scores(n, cases), checkpoint, workers)
     trained = blended(original, result.weights, settings.blend)
     net.load_state_dict(trained)
     after = mean_psnr(net.eval(), cases)
@@ -235,10 +237,11 @@ def _fit(
     settings: TrainingSettings,
     validate: Validate,
     checkpoint: Path | None,
+    workers: int,
 ) -> FitResult:
     if settings.steps == 0:
         return FitResult(net.state_dict(), [])
-    return fit(net, batches, fit_settings(settings), validate, checkpoint)
+    return fit(net, batches, fit_settings(settings), validate, checkpoint, workers=workers)
 
 
 def blended(base: Weights, trained: Weights, share: float) -> Weights:
