@@ -46,7 +46,7 @@ STEPS = 20_000
 )
 @click.option(
     "--workers",
-    default=1,
+    default=0,
     show_default=True,
     type=click.IntRange(0, 64),
     help="Processes that make photos ahead of their use; any number gives the same weights.",
