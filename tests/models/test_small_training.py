@@ -111,8 +111,11 @@ from luxcore.models.small.batches import SingleBatches
 from luxcore.models.small.fit import prepared
 from luxcore.models.small.samples import CropPool
 from luxcore.models.small.sketch import SketchRooms
+from luxcore.models.small.weights import shipped_network
 
-batches = SingleBatches(CropPool.collect(SketchRooms(1000, 32, 0), range(2), 1), 5, photos=2)
+torch.set_num_threads(2)
+pool = CropPool.collect(SketchRooms(1000, 64, 0), range(2), 1)
+batches = SingleBatches(pool, 5, photos=2, geometry=0.3, estimator=shipped_network("geometry"))
 here, ahead = (list(prepared(batches, range(2, 5), workers)) for workers in (0, 2))
 assert len(here) == len(ahead) == 3
 for one, other in zip(here, ahead, strict=True):

@@ -99,10 +99,11 @@ def fit(
 def prepared(batches: Batches, steps: range, workers: int) -> Iterable[Batch]:
     """The batches of `steps`, in order. Each is a function of its number alone, so `workers`
     change how long it takes and no bit."""
+    made = _ByStep(batches)
     if not workers or not len(steps):
-        return (batches.batch(step) for step in steps)
+        return (made[step] for step in steps)
     return DataLoader(
-        _ByStep(batches), batch_size=None, sampler=steps, num_workers=workers, collate_fn=_as_made
+        made, batch_size=None, sampler=steps, num_workers=workers, collate_fn=_as_made
     )
 
 
@@ -115,7 +116,14 @@ class _ByStep(Dataset[Batch]):
     batches: Batches
 
     def __getitem__(self, step: int) -> Batch:
-        return self.batches.batch(step)
+        # The last bits of guessed geometry depend on the threads that share a convolution, and a
+        # loader's workers have one.
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)
+        try:
+            return self.batches.batch(step)
+        finally:
+            torch.set_num_threads(threads)
 
 
 class _Fit:
